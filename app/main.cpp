@@ -1,0 +1,107 @@
+// The freevoxel program: parses the command line, runs one command, tells the user of errors.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <new>
+#include <string_view>
+
+#include "app/command.h"
+#include "app/help.h"
+#include "app/session.h"
+#include "app/signals.h"
+#include "base/error.h"
+#include "volume/child_reader.h"
+
+namespace freevoxel {
+
+namespace {
+
+enum ExitStatus { kDone = 0, kFailed = 1, kUsage = 2 };
+
+/// Errors are one line, whatever a library put into its message.
+void tellError(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  fmt::print(stderr, "freevoxel: {}\n", text);
+}
+
+/// The command chosen, or null if parsing has said all there is to say; then `status` is set.
+const Command* parse(CLI::App& program, const std::vector<Command>& commands, int argc, char** argv, int& status) {
+  std::string name;
+  const auto refuse = [&](const std::string& text) {
+    for (const Command& command : commands) {
+      if (command.parser->parsed()) name = command.parser->get_name() + ' ';
+    }
+    tellError(fmt::format("{} (see freevoxel {}--help)", text, name));
+    status = kUsage;
+    return nullptr;
+  };
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::Success& request) {  // --help, --version
+    status = program.exit(request);
+    return nullptr;
+  } catch (const CLI::ParseError& error) {
+    return refuse(error.what());
+  } catch (const UsageError& error) {
+    return refuse(error.what());
+  }
+  const auto chosen =
+      std::find_if(commands.begin(), commands.end(), [](const Command& c) { return c.parser->parsed(); });
+  if (chosen == commands.end()) return refuse("give a command");
+  return &*chosen;
+}
+
+int run(int argc, char** argv) {
+  CLI::App program("Order-independent volume renderer: every voxel knows how much light survives on its way out.",
+                   "freevoxel");
+  program.formatter(std::make_shared<HelpFormatter>());
+  program.set_help_flag("-h,--help", "print this help and exit");
+  program.set_version_flag("--version", programVersion(), "print the version and exit");
+  program.require_subcommand(0, 1);
+  program.footer(
+      "freevoxel COMMAND --help is complete. Exit status: 0 done, 1 the input or the machine would not do, "
+      "2 usage.");
+  CommonOptions common;
+  const std::vector<Command> commands = {addGenerate(program, common), addPrecompute(program, common),
+                                         addInfo(program, common),     addVerify(program, common),
+                                         addRender(program, common),   addCompare(program, common),
+                                         addTransfer(program, common), addSheet(program, common)};
+  int status = kDone;
+  const Command* command = parse(program, commands, argc, argv, status);
+  if (command == nullptr) return status;
+  try {
+    Session session(typedCommand(argc, argv), common);
+    const Outcome outcome = command->run(session);
+    session.writeStatistics();
+    return outcome == Outcome::done ? kDone : kFailed;
+  } catch (const UsageError& error) {
+    tellError(fmt::format("{} (see freevoxel {} --help)", error.what(), command->parser->get_name()));
+    return kUsage;
+  }
+}
+
+}  // namespace
+
+}  // namespace freevoxel
+
+int main(int argc, char** argv) {
+  using namespace freevoxel;
+  // Files that foreign libraries read are read in a child process, which is this program again.
+  if (argc == 2 && std::string_view(argv[1]) == kReaderArgument) return runLibraryReader();
+  cleanUpOnSignals();
+  int status = kFailed;
+  try {
+    status = run(argc, argv);
+  } catch (const std::bad_alloc&) {
+    tellError("out of memory: try a smaller volume or a smaller --size, or close other programs");
+  } catch (const std::exception& error) {
+    tellError(error.what());
+  }
+  if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) {
+    tellError("cannot write to standard output");
+    status = kFailed;
+  }
+  return status;
+}

@@ -1,0 +1,298 @@
+// freevoxel render: a picture of an attenuation file or a volume.
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "app/command.h"
+#include "app/input_file.h"
+#include "app/light_options.h"
+#include "app/precompute_report.h"
+#include "base/atomic_file.h"
+#include "base/error.h"
+#include "hierarchy/attenuation_file.h"
+#include "splat/raycast.h"
+#include "splat/splat.h"
+#include "volume/read_volume.h"
+#include "volume/transfer_presets.h"
+
+namespace freevoxel {
+
+namespace {
+
+enum class PictureFormula { paper, direct, normalised, raycast };
+
+struct Background {
+  bool transparent = false;
+  glm::vec3 srgb{0.0f};
+};
+
+struct RenderOptions {
+  std::string input, output, sums, transfer;
+  VolumeOptions raw;
+  CameraOptions camera;
+  LightOptions light;
+  PictureFormula formula = PictureFormula::normalised;
+  SplatOptions splat;
+  Backend backend = Backend::automatic;
+  RaycastOptions raycast;
+  std::optional<Background> background;
+};
+
+Formula splatFormula(PictureFormula formula) {
+  switch (formula) {
+    case PictureFormula::paper:
+      return Formula::paper;
+    case PictureFormula::direct:
+      return Formula::direct;
+    case PictureFormula::normalised:
+      return Formula::normalised;
+    case PictureFormula::raycast:
+      break;
+  }
+  throw InternalError("internal error: ray casting has no sums");
+}
+
+Background parseBackground(std::string_view text) {
+  if (text == "transparent") return {true, glm::vec3(0.0f)};
+  return {false, parseColour(text)};
+}
+
+SplatOrder parseOrder(std::string_view text) {
+  constexpr std::string_view kShuffle = "shuffle:";
+  if (text == "hilbert") return {SplatOrder::Kind::hilbert, 0};
+  if (text == "reverse") return {SplatOrder::Kind::reverse, 0};
+  if (text.starts_with(kShuffle)) return {SplatOrder::Kind::shuffle, parseSeed(text.substr(kShuffle.size()))};
+  throw UsageError(fmt::format("expected hilbert, reverse or shuffle:SEED, found '{}'", text));
+}
+
+double parseStep(std::string_view text) {
+  const double step = parseNumber(text);
+  if (!(step >= 0.001 && step <= 1000.0)) throw UsageError(fmt::format("expected 0.001 to 1000, found {}", text));
+  return step;
+}
+
+/// Throws UsageError if options were given that would do nothing.
+void checkOptions(const RenderOptions& options, const CLI::App& command) {
+  const auto given = [&](const char* name) { return command.get_option(name)->count() > 0; };
+  const bool raycast = options.formula == PictureFormula::raycast;
+  for (const char* name : {"--order", "--backend", "--sums", "--footprint", "--attenuation", "--light",
+                           "--light-direction", "--ambient", "--shading"}) {
+    if (raycast && given(name)) throw UsageError(fmt::format("{} does nothing with --formula raycast", name));
+  }
+  for (const char* name : {"--raycast", "--step"}) {
+    if (!raycast && given(name)) throw UsageError(fmt::format("{} needs --formula raycast", name));
+  }
+  const std::string extension = lowerCaseExtension(options.output);
+  if (extension != "png" && extension != "exr") {
+    throw UsageError(fmt::format("--output: expected a name ending in .png or .exr, found '{}'", options.output));
+  }
+  if (!options.sums.empty() && lowerCaseExtension(options.sums) != "exr") {
+    throw UsageError(fmt::format("--sums: expected a name ending in .exr, found '{}'", options.sums));
+  }
+}
+
+/// Between two labels there is nothing: what interpolates values makes way for what does not. Throws UsageError if it
+/// was asked for.
+void keepLabelsApart(RenderOptions& options, const CLI::App& command) {
+  const auto refuse = [&](const char* name, bool wrong) {
+    if (wrong && command.get_option(name)->count() > 0) {
+      throw UsageError(fmt::format("{} {} interpolates between values, which labels do not allow", name,
+                                   command.get_option(name)->as<std::string>()));
+    }
+  };
+  refuse("--raycast", options.raycast.classification != RaycastClassification::nearest);
+  refuse("--footprint", options.splat.footprint != Footprint::kernel);
+  refuse("--attenuation", options.splat.attenuation == AttenuationSource::swept);
+  options.raycast.classification = RaycastClassification::nearest;
+  options.splat.footprint = Footprint::kernel;
+  options.splat.attenuation = AttenuationSource::stored;
+}
+
+/// The transfer function to draw an attenuation file with: its own, or one of the same opacities.
+TransferFunction transferFor(const AttenuationFile& file, const std::string& path) {
+  if (path.empty()) return file.transfer();
+  TransferFunction transfer = readTransferFunction(path);
+  if (opacityHash(transfer) != opacityHash(file.transfer())) {
+    throw InputError(
+        fmt::format("{}: was made for other opacities than those of {}; run: freevoxel precompute VOLUME "
+                    "--transfer {} -o {}",
+                    file.path(), path, path, file.path()));
+  }
+  return transfer;
+}
+
+Image drawRays(const ValueGrid& grid, const TransferFunction& transfer, const RenderOptions& options,
+               Session& session) {
+  const Camera camera = makeCamera(options.camera, worldBounds(grid.placement, grid.dims));
+  return session.timed("raycast", [&] { return raycast(grid, transfer, camera, options.raycast, session.progress()); });
+}
+
+/// `file` may be null: then attenuation is swept.
+Image drawSplats(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer,
+                 const RenderOptions& options, Session& session) {
+  const Camera camera = makeCamera(options.camera, worldBounds(grid.placement, grid.dims));
+  Splatter splatter = session.timed("open", [&] { return Splatter(grid, file, transfer, options.backend); });
+  const SplatResult result = splatter.render(camera, options.splat, session.progress());
+  session.addSeconds("attenuation", result.statistics.attenuationSeconds);
+  session.addSeconds("light", result.statistics.lightSeconds);
+  session.addSeconds("setup", result.statistics.setupSeconds);
+  session.addSeconds("draw", result.statistics.drawSeconds);
+  session.statistics["backend"] = result.statistics.backend;
+  if (!result.statistics.glRenderer.empty()) session.statistics["glRenderer"] = result.statistics.glRenderer;
+  session.statistics["attenuation"] = result.statistics.attenuation;
+  session.statistics["voxels"] = voxelCount(grid.dims);
+  if (file != nullptr) {
+    session.statistics["storedVoxels"] = file->storedVoxels();
+    session.statistics["fileBytes"] = file->fileBytes();
+    session.statistics["bytesPerVoxel"] = double(file->fileBytes()) / double(voxelCount(grid.dims));
+    session.statistics["nonFinite"] = file->nonFinite();
+  }
+  session.statistics["splats"] = result.statistics.splats;
+  session.statistics["culledSplats"] = result.statistics.culledSplats;
+  session.statistics["fragments"] = result.statistics.fragments;
+  session.statistics["blocks"] = result.statistics.blocks;
+  session.statistics["culledBlocks"] = result.statistics.culledBlocks;
+  session.statistics["passes"] = result.statistics.passes;
+  session.statistics["quantum"] = result.sums.quantum;
+  if (!options.sums.empty()) {
+    session.timed("write",
+                  [&] { writeExr(options.sums, result.sums.image, sumChannelNames(), session.imageMetadata()); });
+  }
+  return session.timed("resolve", [&] { return resolve(result.sums, splatFormula(options.formula)); });
+}
+
+Image drawFile(RenderOptions options, const CLI::App& command, Session& session) {
+  if (hasVolumeOptions(options.raw)) throw UsageError("options for raw volumes make no sense for an .fvx file");
+  const AttenuationFile file(options.input);
+  const TransferFunction transfer = transferFor(file, options.transfer);
+  if (transfer.isLabels) keepLabelsApart(options, command);
+  const ValueGrid grid = session.timed("read", [&] { return valueGrid(file); });
+  if (options.formula == PictureFormula::raycast) return drawRays(grid, transfer, options, session);
+  return drawSplats(grid, &file, transfer, options, session);
+}
+
+/// Whether a picture takes the 26 stored directions.
+bool needsFile(const RenderOptions& options) {
+  return options.formula == PictureFormula::paper || options.splat.attenuation == AttenuationSource::stored;
+}
+
+Image drawVolume(RenderOptions options, const CLI::App& command, Session& session) {
+  if (options.transfer.empty()) {
+    openVolume(options.input, options.raw);  // what ails the file comes first
+    throw UsageError("--transfer is required to draw a volume");
+  }
+  const Volume volume = session.timed("read", [&] { return readVolume(options.input, options.raw); });
+  const TransferFunction transfer = chooseTransfer(options.transfer, volume);
+  if (transfer.isLabels) keepLabelsApart(options, command);
+  const ValueGrid grid = session.timed("read", [&] { return valueGrid(volume, transfer); });
+  if (options.formula == PictureFormula::raycast) {
+    session.statistics["voxels"] = volume.header.voxels();
+    return drawRays(grid, transfer, options, session);
+  }
+  if (!needsFile(options)) return drawSplats(grid, nullptr, transfer, options, session);
+  session.tell("precomputing into a temporary file; `freevoxel precompute` keeps it for the next picture");
+  // Never committed, so it goes when this function ends.
+  const AtomicFile scratch(options.output + ".fvx");
+  PrecomputeOptions precomputeOptions;
+  precomputeOptions.command = session.command();
+  if (options.formula == PictureFormula::paper || transfer.isLabels)
+    precomputeOptions.classification = Classification::voxel;
+  reportPrecompute(precompute(volume, transfer, scratch.temporaryPath(), precomputeOptions, session.progress()),
+                   session);
+  const AttenuationFile file(scratch.temporaryPath());
+  return drawSplats(grid, &file, transfer, options, session);
+}
+
+void writePicture(const RenderOptions& options, Image picture, Session& session) {
+  const std::vector<std::string> channels = {"R", "G", "B", "A"};
+  const bool png = lowerCaseExtension(options.output) == "png";
+  const bool transparent = options.background ? options.background->transparent : !png;
+  if (!transparent) {
+    const glm::vec3 srgb = options.background ? options.background->srgb : glm::vec3(0.0f);
+    picture =
+        overBackground(picture, glm::vec3(linearFromSrgb(srgb.r), linearFromSrgb(srgb.g), linearFromSrgb(srgb.b)));
+  }
+  session.timed("write", [&] {
+    if (png) {
+      writePng(options.output, picture, session.imageMetadata(), transparent);
+    } else {
+      writeExr(options.output, picture, channels, session.imageMetadata());
+    }
+  });
+}
+
+Outcome render(RenderOptions options, const CLI::App& command, Session& session) {
+  checkOptions(options, command);
+  if (options.formula != PictureFormula::raycast) options.splat.formula = splatFormula(options.formula);
+  options.splat.lighting = makeLighting(options.light);
+  if (options.formula == PictureFormula::paper && command.get_option("--footprint")->count() == 0) {
+    options.splat.footprint = Footprint::kernel;
+  }
+  writePicture(
+      options,
+      isAttenuationFile(options.input) ? drawFile(options, command, session) : drawVolume(options, command, session),
+      session);
+  return Outcome::done;
+}
+
+}  // namespace
+
+Command addRender(CLI::App& program, CommonOptions& common) {
+  auto options = std::make_shared<RenderOptions>();
+  CLI::App* command = addSubcommand(program, "render", "make a picture of an attenuation file or a volume",
+                                    "freevoxel render cloud.fvx --orbit 30,20 --size 1000x800 -o cloud.png");
+  command->add_option("INPUT", options->input, "an attenuation file (.fvx) or a volume; a volume needs --transfer")
+      ->required();
+  command
+      ->add_option("-o,--output", options->output,
+                   "the picture: PNG is sRGB, 8 bits; EXR is linear, premultiplied, 32 bits, with alpha")
+      ->type_name("FILE.png|FILE.exr")
+      ->required();
+  addTransferOption(*command, options->transfer,
+                    "; for an attenuation file a file of the same opacities (default: the file's own)");
+  addChoice<PictureFormula>(*command, "--formula", options->formula,
+                            {{"normalised", PictureFormula::normalised},
+                             {"direct", PictureFormula::direct},
+                             {"paper", PictureFormula::paper},
+                             {"raycast", PictureFormula::raycast}},
+                            "how the picture is made: order-free splats with exact opacity, plain sums, the paper to "
+                            "the letter, or the ray-cast reference");
+  addChoice<RaycastClassification>(*command, "--raycast", options->raycast.classification,
+                                   {{"post", RaycastClassification::post},
+                                    {"pre", RaycastClassification::pre},
+                                    {"nearest", RaycastClassification::nearest}},
+                                   "of raycast: classify after or before interpolation, or do not interpolate");
+  addParsed<double>(
+      *command, "--step", options->raycast.step, "EDGES",
+      fmt::format("of raycast: step in shortest voxel edges, 0.001 to 1000 (default {})", options->raycast.step),
+      parseStep);
+  addChoice<Footprint>(*command, "--footprint", options->splat.footprint,
+                       {{"cell", Footprint::cell}, {"kernel", Footprint::kernel}},
+                       "what a splat covers: cells between voxels, or the paper's kernels round voxels (default for "
+                       "formula paper)");
+  addChoice<AttenuationSource>(*command, "--attenuation", options->splat.attenuation,
+                               {{"auto", AttenuationSource::automatic},
+                                {"stored", AttenuationSource::stored},
+                                {"swept", AttenuationSource::swept}},
+                               "what light loses on its way to the eye: from the file's 26 directions, or swept for "
+                               "this eye; auto takes the file "
+                               "unless the eye is inside the volume");
+  addChoice<Backend>(*command, "--backend", options->backend,
+                     {{"auto", Backend::automatic}, {"gl", Backend::gl}, {"cpu", Backend::cpu}},
+                     "what draws splats; the bits are the same");
+  addParsed<SplatOrder>(*command, "--order", options->splat.order, "hilbert|reverse|shuffle:SEED",
+                        "order of splats; the bits are the same (default hilbert)", parseOrder);
+  command->add_option("--sums", options->sums, "write the six sums of every pixel: R G B O DepthHigh DepthLow")
+      ->type_name("FILE.exr");
+  addParsed(*command, "--background", options->background, "COLOUR",
+            "sRGB: #rrggbb, r,g,b from 0 to 1, transparent, or one of " + colourNames() +
+                " (default: black for PNG, transparent for EXR)",
+            parseBackground);
+  addCameraOptions(*command, options->camera);
+  addLightOptions(*command, options->light);
+  addVolumeOptions(*command, options->raw);
+  addCommonOptions(*command, common);
+  return {command, [options, command](Session& session) { return render(*options, *command, session); }};
+}
+
+}  // namespace freevoxel

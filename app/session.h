@@ -1,0 +1,70 @@
+// What one run of the program knows: how it was called, whom it tells, what it did.
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "app/options.h"
+#include "base/image.h"
+#include "base/progress.h"
+
+namespace freevoxel {
+
+/// The program's name and version, "freevoxel 0.1.0".
+std::string programVersion();
+
+/// The arguments as they would be typed into a shell, the program's path shortened to its name.
+std::string typedCommand(int argc, const char* const* argv);
+
+class Session {
+ public:
+  Session(std::string command, const CommonOptions& options);
+
+  const std::string& command() const { return command_; }
+  Progress& progress() { return *progress_; }
+  ImageMetadata imageMetadata() const;
+
+  /// Shown on stderr unless --quiet, and kept for the statistics.
+  void warn(const std::string& text);
+  /// Shown on stderr unless --quiet.
+  void tell(const std::string& text) const;
+  /// Shown on stderr: why the run fails.
+  void complain(const std::string& text) const;
+
+  /// Calls f and adds the time it took to statistics "seconds" under `stage`.
+  template <class F>
+  decltype(auto) timed(const std::string& stage, F&& f) {
+    const StageTimer timer{*this, stage, std::chrono::steady_clock::now()};
+    return f();
+  }
+  void addSeconds(const std::string& stage, double seconds);
+
+  /// Entries of the statistics file.
+  nlohmann::ordered_json statistics = nlohmann::ordered_json::object();
+
+  /// Writes the statistics file if one was asked for. Throws MachineError.
+  void writeStatistics();
+
+ private:
+  struct StageTimer {
+    Session& session;
+    const std::string& stage;
+    std::chrono::steady_clock::time_point start;
+    ~StageTimer() {
+      session.addSeconds(stage, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    }
+  };
+
+  std::string command_;
+  const CommonOptions& options_;
+  std::unique_ptr<Progress> progress_;
+  std::vector<std::string> warnings_;
+  nlohmann::ordered_json seconds_ = nlohmann::ordered_json::object();
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace freevoxel

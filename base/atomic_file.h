@@ -1,0 +1,43 @@
+// Files that appear whole or not at all.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+namespace freevoxel {
+
+/// A file written under a temporary name beside its target, then synced and renamed. Destroyed before commit(), it
+/// removes the temporary file. Move-only.
+class AtomicFile {
+ public:
+  /// Throws MachineError if the temporary file cannot be made (directory missing, not writable).
+  explicit AtomicFile(std::string path);
+  ~AtomicFile();
+  AtomicFile(AtomicFile&& other) noexcept;
+  AtomicFile& operator=(AtomicFile&&) = delete;
+
+  const std::string& path() const { return path_; }
+  /// For libraries that write by name; has the target's extension.
+  const std::string& temporaryPath() const { return temporaryPath_; }
+  int descriptor() const { return descriptor_; }
+
+  /// Makes the file `bytes` long with its blocks allocated, so that a full disk shows here and not as SIGBUS in a
+  /// mapping. Throws MachineError.
+  void reserve(uint64_t bytes);
+  /// Writes all of `bytes` at `offset`. Throws MachineError.
+  void writeAt(uint64_t offset, std::span<const std::byte> bytes);
+  /// Syncs and renames onto path(). Throws MachineError.
+  void commit();
+
+ private:
+  std::string path_;
+  std::string temporaryPath_;
+  int descriptor_ = -1;
+};
+
+/// Removes the temporary files of every AtomicFile alive. For signal handlers that end the program: calls nothing but
+/// unlink.
+void removeTemporaryFiles() noexcept;
+
+}  // namespace freevoxel

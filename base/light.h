@@ -1,0 +1,46 @@
+// Lamps and how surfaces answer to them.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <vector>
+
+namespace freevoxel {
+
+/// A lamp: far away in a direction, or at a point of world space. Light does not fade with distance.
+struct Light {
+  bool directional = false;
+  glm::dvec3 world{0.0};   ///< a position, or, if directional, the direction towards the lamp, of any length but 0
+  glm::vec3 linear{1.0f};  ///< linear RGB, each >= 0
+};
+
+enum class Shading {
+  none,     ///< light scatters the same way everywhere
+  lambert,  ///< by the angle between light and gradient, on the side that faces the eye
+  phong,    ///< lambert, and a highlight in the colours of light and voxel
+};
+
+/// What lights a scene. Without lamps and with ambient 1 every voxel shines with its own colour.
+struct Lighting {
+  std::vector<Light> lights;
+  float ambient = 1.0f;  ///< >= 0, reaches every voxel unhindered
+  Shading shading = Shading::none;
+
+  bool unlit() const { return lights.empty() && ambient == 1.0f; }
+};
+
+/// Share of diffuse light in Phong shading, share and exponent of the highlight.
+inline constexpr float kPhongHighlight = 0.35f;
+inline constexpr float kPhongExponent = 24.0f;
+
+/// Gradients of this share of the value range per shortest voxel edge count fully as surfaces; where values hardly
+/// change there is no surface to shade, and light scatters the same way in all directions.
+inline constexpr float kSurfaceGradient = 0.02f;
+
+/// How much of a lamp's light a voxel or sample sends to the eye. `gradient`: change of value per shortest voxel edge
+/// as a share of the value range, world axes; `towardsLight`, `towardsEye`: unit vectors, world.
+float shade(Shading shading, glm::vec3 gradient, glm::vec3 towardsLight, glm::vec3 towardsEye);
+
+/// Largest value of `shade`.
+float largestShade(Shading shading);
+
+}  // namespace freevoxel

@@ -1,0 +1,69 @@
+# Compiler settings common to every target, and the two functions the folders use.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+if(NOT CMAKE_BUILD_TYPE)
+  set(CMAKE_BUILD_TYPE Release)
+endif()
+
+option(FREEVOXEL_WERROR "Treat warnings as errors" ON)
+option(FREEVOXEL_SANITIZE "Build with the address and undefined behaviour sanitizers" OFF)
+
+find_package(PkgConfig REQUIRED)
+find_package(OpenMP REQUIRED COMPONENTS CXX)
+find_package(Threads REQUIRED)
+find_package(ZLIB REQUIRED)
+find_package(glm REQUIRED)
+find_package(fmt REQUIRED)
+find_package(nlohmann_json 3.11 REQUIRED)
+pkg_check_modules(OpenImageIO REQUIRED IMPORTED_TARGET OpenImageIO)
+pkg_check_modules(XxHash REQUIRED IMPORTED_TARGET libxxhash)
+pkg_check_modules(Egl REQUIRED IMPORTED_TARGET egl)
+pkg_check_modules(Epoxy REQUIRED IMPORTED_TARGET epoxy)
+include(FreevoxelReaders)
+
+add_library(freevoxel_settings INTERFACE)
+target_include_directories(freevoxel_settings INTERFACE ${PROJECT_SOURCE_DIR})
+target_compile_options(freevoxel_settings INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wnon-virtual-dtor -Wimplicit-fallthrough
+  # A fused multiply-add rounds once where the shaders round twice: backends would differ.
+  -ffp-contract=off
+  # Options structs are filled by designated initialisers; what is not named has its default.
+  -Wno-missing-field-initializers
+  # gcc 12 warns of overlaps inside std::string's own operator+ (its bug 105651).
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
+  $<$<BOOL:${FREEVOXEL_WERROR}>:-Werror>)
+if(FREEVOXEL_SANITIZE)
+  target_compile_options(freevoxel_settings INTERFACE
+    -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
+  target_link_options(freevoxel_settings INTERFACE -fsanitize=address,undefined)
+endif()
+target_link_libraries(freevoxel_settings INTERFACE Threads::Threads)
+
+# freevoxel_library(NAME SOURCES ... LINKS ...): the one library of a folder, freevoxel_NAME.
+function(freevoxel_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
+  add_library(freevoxel_${name} STATIC ${arg_SOURCES})
+  target_link_libraries(freevoxel_${name} PUBLIC freevoxel_settings ${arg_LINKS})
+endfunction()
+
+# freevoxel_test(NAME SOURCES ... LINKS ... [LABELS label]): a GoogleTest program; every case of it is a CTest test.
+# Tests labelled "quick" also run under the sanitizers, those labelled "full" only in scripts/test_full.sh. (One label:
+# gtest_discover_tests would take a second one, or an empty one, for the next property.)
+function(freevoxel_test name)
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  if(NOT arg_TIMEOUT)
+    set(arg_TIMEOUT 120)
+  endif()
+  if(arg_LABELS)
+    set(labels LABELS ${arg_LABELS})
+  endif()
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LINKS} freevoxel_test_support)
+  gtest_discover_tests(${name}
+    DISCOVERY_TIMEOUT 60
+    PROPERTIES ${labels} TIMEOUT ${arg_TIMEOUT}
+    ENVIRONMENT "${FREEVOXEL_TEST_ENVIRONMENT}")
+endfunction()

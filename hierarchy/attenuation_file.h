@@ -1,0 +1,104 @@
+// The mapped reader of attenuation files.
+#pragma once
+
+#include <cstdint>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "base/mapped_file.h"
+#include "base/placement.h"
+#include "precompute/format.h"
+#include "precompute/hilbert.h"
+#include "volume/transfer_function.h"
+#include "volume/value_codes.h"
+
+namespace freevoxel {
+
+/// One stored brick of the finest level: views into the map, valid as long as the AttenuationFile.
+/// Planes hold edge^3 entries in curve order (see `curve`). Voxels of the brick that lie outside the volume have code 0
+/// and attenuation 255 and must be skipped: origin + curve[i] >= dims.
+struct BrickView {
+  uint64_t hilbertIndex = 0;  ///< of the brick among bricks
+  glm::ivec3 origin{0};       ///< its first voxel
+  int edge = 16;              ///< voxels
+  uint32_t visibleVoxels = 0;
+  std::span<const LocalPosition> curve;  ///< step along the curve -> place in the brick
+  std::span<const uint16_t> steps;       ///< local linear index (x fastest) -> step along the curve
+  int bytesPerCode = 1;
+  const std::byte* codes = nullptr;      ///< value codes, 1 or 2 bytes each, little-endian
+  const uint8_t* attenuations[26] = {};  ///< per direction index: round(255 * A)
+
+  uint32_t code(size_t step) const {
+    return bytesPerCode == 1 ? uint32_t(codes[step]) : uint32_t(codes[2 * step]) | uint32_t(codes[2 * step + 1]) << 8;
+  }
+};
+
+/// An attenuation file opened for reading. Everything but the payload is checked on open: every offset, size and count
+/// is known to lie inside the file before it is used. Move-only; const members may be called from many threads.
+class AttenuationFile {
+ public:
+  /// Throws InputError naming file, offset, what was expected and what was found.
+  explicit AttenuationFile(const std::string& path);
+
+  const std::string& path() const { return path_; }
+  glm::ivec3 dims() const { return {metadata_.dims[0], metadata_.dims[1], metadata_.dims[2]}; }
+  const Placement& placement() const { return placement_; }
+  const ValueCoding& coding() const { return coding_; }
+  const TransferFunction& transfer() const { return transfer_; }  ///< the one it was made with
+  Classification classification() const { return metadata_.classification; }
+  Layout layout() const { return metadata_.layout; }
+  int levels() const { return int(metadata_.levels); }
+  int brickEdge() const { return int(metadata_.brickEdge); }
+  uint64_t fileBytes() const { return map_.bytes().size(); }
+  uint64_t storedVoxels() const { return metadata_.storedVoxels; }          ///< of the volume, in stored bricks
+  uint64_t visibleVoxels() const { return metadata_.visibleVoxels; }        ///< opacity > 0
+  uint64_t nonFinite() const { return metadata_.nonFinite; }                ///< voxels that were NaN or infinite
+  double largestValueError() const { return metadata_.largestValueError; }  ///< by coding values, data units
+  std::string command() const;  ///< that made the file; empty if not recorded
+
+  size_t brickCount() const { return bricks_.size(); }  ///< stored bricks, sorted along the Hilbert curve
+  BrickView brick(size_t i) const;
+  /// Position in brick() order of the brick at `brickPosition` (voxel / brickEdge), or nothing if it is not stored (or
+  /// lies outside the volume).
+  std::optional<size_t> findBrick(glm::ivec3 brickPosition) const;
+
+  /// Checks every checksum and every padding byte. Throws InputError naming the first damaged section and its offset.
+  void verify() const;
+  /// Checks one brick against its own checksums, which were checked on open. Throws InputError naming its offset.
+  void verifyBrick(size_t i) const;
+
+ private:
+  std::span<const std::byte> content(const SectionEntry& entry) const;
+  const SectionEntry* find(SectionType type) const;
+  const SectionEntry& required(SectionType type) const;
+
+  void readHeader();
+  void readSectionTable(const FileHeader& header);
+  void readMetadata();
+  void readTransfer();
+  void readDirections();
+  void readBricks();
+  void verifyHash(const SectionEntry& entry, uint64_t hash) const;
+  void verifySection(const SectionEntry& entry) const;
+  void checkBrickSection(SectionType type, uint64_t bytesPerBrick) const;
+
+  uint64_t brickVoxels() const;
+  uint64_t codeBytes() const { return brickVoxels() * metadata_.codeBytes; }
+  uint64_t attenuationBytes() const { return brickVoxels() * kDirectionsPerSection; }
+
+  std::string path_;
+  MappedFile map_;
+  std::vector<SectionEntry> sections_;
+  Metadata metadata_{};
+  Placement placement_;
+  ValueCoding coding_;
+  TransferFunction transfer_;
+  int curveOrder_ = 0;                  ///< of the curve through the bricks
+  std::span<const BrickEntry> bricks_;  ///< in the map
+  std::span<const std::byte> codes_, backward_, forward_;
+};
+
+}  // namespace freevoxel

@@ -1,0 +1,30 @@
+#include "precompute/checksums.h"
+
+#include <xxhash.h>
+
+#include <cstring>
+#include <vector>
+
+namespace freevoxel {
+
+uint64_t headerHash(const FileHeader& header, std::span<const SectionEntry> sections) {
+  const auto headerBytes = std::as_bytes(std::span(&header, 1)).first(offsetof(FileHeader, hash));
+  const auto sectionBytes = std::as_bytes(sections);
+  std::vector<std::byte> bytes(headerBytes.begin(), headerBytes.end());
+  bytes.insert(bytes.end(), sectionBytes.begin(), sectionBytes.end());
+  return contentHash(bytes);
+}
+
+uint64_t contentHash(std::span<const std::byte> bytes) {
+  return XXH3_64bits(bytes.data(), bytes.size());
+}
+
+uint64_t brickSectionHash(std::span<const BrickEntry> bricks, uint64_t BrickEntry::*hash) {
+  std::vector<uint64_t> hashes;
+  hashes.reserve(bricks.size());
+  for (const BrickEntry& brick : bricks)
+    hashes.push_back(brick.*hash);
+  return contentHash(std::as_bytes(std::span(hashes)));
+}
+
+}  // namespace freevoxel

@@ -1,0 +1,22 @@
+// The hashes in an attenuation file, XXH3-64 all of them (precompute/format.h says what each covers).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "precompute/format.h"
+
+namespace freevoxel {
+
+/// FileHeader::hash; the header's own hash field does not enter.
+uint64_t headerHash(const FileHeader& header, std::span<const SectionEntry> sections);
+
+/// Of some bytes: SectionEntry::hash of most sections, and the hashes in a BrickEntry.
+uint64_t contentHash(std::span<const std::byte> bytes);
+
+/// SectionEntry::hash of a section whose bricks have a hash each, the member `hash` of their entries. So neither
+/// writing nor checking a file reads brick data twice.
+uint64_t brickSectionHash(std::span<const BrickEntry> bricks, uint64_t BrickEntry::*hash);
+
+}  // namespace freevoxel

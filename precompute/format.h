@@ -1,0 +1,203 @@
+// The attenuation file, .fvx, byte by byte. docs/format.md says the same in more words.
+//
+// All numbers are little-endian; "f64" is IEEE binary64; every byte not drawn here is zero.
+//
+//   offset  bytes  file
+//        0     32  FileHeader
+//             0      8  magic 89 'F' 'V' 'X' 0D 0A 1A 0A
+//             8      4  version, 1
+//            12      4  number of sections, n
+//            16      8  bytes of the whole file
+//            24      8  XXH3-64 of bytes 0..23 and of the section table
+//       32  40 n  section table, one SectionEntry per section, ascending offsets
+//             0      4  type, four ASCII characters
+//             4      4  flags; bit 0: a reader that does not know the type may skip the section
+//             8      8  offset, a multiple of 8, and of 4096 for CODE, ATTB and ATTF
+//            16      8  bytes
+//            24      8  number of items
+//            32      8  XXH3-64 of the section's bytes; of CODE, ATTB and ATTF: of their hashes in BRIK, brick by brick
+//             sections, none overlapping another, zeros between them; the file ends where the last one ends
+//
+//   type  items  what an item is
+//   META      1  Metadata, 240 bytes
+//             0     12  dims x y z, i32 each
+//            12      4  brick edge E in voxels: 8, 16 or 32
+//            16     24  spacing x y z, f64, in the volume's length unit
+//            40     24  origin x y z, f64: centre of voxel (0,0,0)
+//            64     72  direction, 9 f64, column by column: unit vectors of the index axes in world space
+//           136      8  length unit, ASCII, zero padded; all zero: not known
+//           144      8  value of code 0, f64
+//           152      8  value step from code to code, f64
+//           160      4  largest code, 1..65535
+//           164      4  bytes per code, b: 1 if the largest code is <= 255, else 2
+//           168      4  classification: 0 voxel, 1 preintegrated
+//           172      4  layout: 0 dense, 1 compact
+//           176      4  levels: 1, the finest only
+//           180      4  zero
+//           184      8  voxels of the volume, dims x * y * z
+//           192      8  voxels of the volume that lie in stored bricks
+//           200      8  visible voxels: opacity > 0
+//           208      8  voxels that were NaN or infinite
+//           216      8  hash of all that attenuation depends on in the transfer function (opacityHash)
+//           224      8  largest error of a value inside the range by coding it, f64
+//           232      8  zero
+//   XFER  bytes  transfer function, JSON text (UTF-8)
+//   DIRS     26  direction: x y z, i8 each, pointing from the voxel outwards, in the order of direction indices
+//   BRIK  bricks stored brick, BrickEntry, ascending Hilbert index
+//             0      8  Hilbert index of the brick, position (voxel / E), in the smallest cube of 2^k bricks an edge
+//                       that holds the volume
+//             8      4  visible voxels in it
+//            12      4  zero
+//            16     24  XXH3-64 of the brick's bytes in CODE, in ATTB and in ATTF
+//   CODE  bricks value codes: E^3 of b bytes each along the Hilbert curve; 0 outside the volume
+//   ATTB  bricks 13 planes of E^3 bytes, directions 0..12: round(255 A) along the curve; 255 outside the volume
+//   ATTF  bricks 13 planes of E^3 bytes, directions 13..25
+//   CMND  bytes  the command that made the file, UTF-8 text; may be skipped
+//
+// Bricks stand in CODE, ATTB and ATTF in the order of BRIK, so any one is found by multiplication, and checked without
+// reading the others: the header's hash covers that of BRIK, which covers those of the bricks. A brick is stored if one
+// of its voxels is a corner of a visible cell.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string_view>
+
+#include "shaders/shared/directions.h"
+
+namespace freevoxel {
+
+static_assert(std::endian::native == std::endian::little, "the file is mapped and used as it is");
+
+/// How A8 is made of values: the paper's Eq. 5, product of the transmittances of the voxels strictly between a voxel
+/// and the outside; or Eq. 4, every segment between two voxels classified after interpolation between their values.
+enum class Classification : uint32_t { voxel = 0, preintegrated = 1 };
+
+/// dense: 26 bytes per stored voxel, the paper's section 5. compact: only the faces where rays enter bricks.
+enum class Layout : uint32_t { dense = 0, compact = 1 };
+
+/// Names on the command line.
+constexpr std::string_view classificationName(Classification classification) {
+  return classification == Classification::voxel ? "voxel" : "preintegrated";
+}
+constexpr std::string_view layoutName(Layout layout) {
+  return layout == Layout::dense ? "dense" : "compact";
+}
+constexpr std::optional<Classification> classificationFromName(std::string_view name) {
+  if (name == "voxel") return Classification::voxel;
+  if (name == "preintegrated") return Classification::preintegrated;
+  return std::nullopt;
+}
+constexpr std::optional<Layout> layoutFromName(std::string_view name) {
+  if (name == "dense") return Layout::dense;
+  if (name == "compact") return Layout::compact;
+  return std::nullopt;
+}
+
+/// Like PNG's: a byte over 127, a name, and line ends and control-Z that text transfers would damage.
+inline constexpr std::array<uint8_t, 8> kFileMagic = {0x89, 'F', 'V', 'X', 0x0d, 0x0a, 0x1a, 0x0a};
+inline constexpr uint32_t kFileVersion = 1;
+
+inline constexpr uint64_t kSectionAlignment = 8;
+/// Brick data start on a page so that they can be mapped, or read past the page cache.
+inline constexpr uint64_t kPageBytes = 4096;
+/// Far more than there will be types; bounds what is read on the word of a damaged header.
+inline constexpr uint32_t kLargestSectionCount = 1024;
+
+inline constexpr int kDirectionsPerSection = shared::kDirectionCount / 2;
+inline constexpr uint8_t kAttenuationOutside = 255;
+
+/// Four characters in reading order, as they stand in the file.
+using SectionType = std::array<char, 4>;
+namespace section {
+inline constexpr SectionType kMetadata = {'M', 'E', 'T', 'A'};
+inline constexpr SectionType kTransfer = {'X', 'F', 'E', 'R'};
+inline constexpr SectionType kDirections = {'D', 'I', 'R', 'S'};
+inline constexpr SectionType kBricks = {'B', 'R', 'I', 'K'};
+inline constexpr SectionType kCodes = {'C', 'O', 'D', 'E'};
+inline constexpr SectionType kBackward = {'A', 'T', 'T', 'B'};
+inline constexpr SectionType kForward = {'A', 'T', 'T', 'F'};
+inline constexpr SectionType kCommand = {'C', 'M', 'N', 'D'};
+}  // namespace section
+
+inline constexpr uint32_t kSectionOptional = 1;  ///< SectionEntry::flags
+
+struct FileHeader {
+  std::array<uint8_t, 8> magic;
+  uint32_t version;
+  uint32_t sectionCount;
+  uint64_t fileBytes;
+  uint64_t hash;
+};
+static_assert(sizeof(FileHeader) == 32 && offsetof(FileHeader, version) == 8 &&
+              offsetof(FileHeader, sectionCount) == 12 && offsetof(FileHeader, fileBytes) == 16 &&
+              offsetof(FileHeader, hash) == 24);
+
+struct SectionEntry {
+  SectionType type;
+  uint32_t flags;
+  uint64_t offset;
+  uint64_t bytes;
+  uint64_t items;
+  uint64_t hash;
+};
+static_assert(sizeof(SectionEntry) == 40 && offsetof(SectionEntry, flags) == 4 && offsetof(SectionEntry, offset) == 8 &&
+              offsetof(SectionEntry, bytes) == 16 && offsetof(SectionEntry, items) == 24 &&
+              offsetof(SectionEntry, hash) == 32);
+
+struct Metadata {
+  int32_t dims[3];
+  uint32_t brickEdge;
+  double spacing[3];
+  double origin[3];
+  double direction[9];
+  char lengthUnit[8];
+  double codeLow;
+  double codeStep;
+  uint32_t codeLargest;
+  uint32_t codeBytes;
+  Classification classification;
+  Layout layout;
+  uint32_t levels;
+  uint32_t zero0;
+  uint64_t voxels;
+  uint64_t storedVoxels;
+  uint64_t visibleVoxels;
+  uint64_t nonFinite;
+  uint64_t opacityHash;
+  double largestValueError;
+  uint64_t zero1;
+};
+static_assert(sizeof(Metadata) == 240 && offsetof(Metadata, dims) == 0 && offsetof(Metadata, brickEdge) == 12 &&
+              offsetof(Metadata, spacing) == 16 && offsetof(Metadata, origin) == 40 &&
+              offsetof(Metadata, direction) == 64 && offsetof(Metadata, lengthUnit) == 136 &&
+              offsetof(Metadata, codeLow) == 144 && offsetof(Metadata, codeStep) == 152 &&
+              offsetof(Metadata, codeLargest) == 160 && offsetof(Metadata, codeBytes) == 164 &&
+              offsetof(Metadata, classification) == 168 && offsetof(Metadata, layout) == 172 &&
+              offsetof(Metadata, levels) == 176 && offsetof(Metadata, zero0) == 180 &&
+              offsetof(Metadata, voxels) == 184 && offsetof(Metadata, storedVoxels) == 192 &&
+              offsetof(Metadata, visibleVoxels) == 200 && offsetof(Metadata, nonFinite) == 208 &&
+              offsetof(Metadata, opacityHash) == 216 && offsetof(Metadata, largestValueError) == 224 &&
+              offsetof(Metadata, zero1) == 232);
+
+struct BrickEntry {
+  uint64_t hilbertIndex;
+  uint32_t visibleVoxels;
+  uint32_t zero;
+  uint64_t codesHash;
+  uint64_t backwardHash;
+  uint64_t forwardHash;
+};
+static_assert(sizeof(BrickEntry) == 40 && offsetof(BrickEntry, visibleVoxels) == 8 &&
+              offsetof(BrickEntry, zero) == 12 && offsetof(BrickEntry, codesHash) == 16 &&
+              offsetof(BrickEntry, backwardHash) == 24 && offsetof(BrickEntry, forwardHash) == 32);
+
+/// Brick edges that files may have: 4096-byte planes at 16; 32768 local positions, all that 16 bits hold, at 32.
+constexpr bool validBrickEdge(int64_t edge) {
+  return edge == 8 || edge == 16 || edge == 32;
+}
+
+}  // namespace freevoxel

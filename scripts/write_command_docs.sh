@@ -1,0 +1,48 @@
+#!/usr/bin/env bash
+# Prints docs/commands.md as the program's own --help tells it:
+#   scripts/write_command_docs.sh build/release/bin/freevoxel > docs/commands.md
+set -euo pipefail
+program=$1
+
+cat <<'TEXT'
+# Commands
+
+What `freevoxel --help` and `freevoxel COMMAND --help` print; written by `scripts/write_command_docs.sh`, and a test
+compares the two. Data go to stdout, everything said to the user goes to stderr.
+TEXT
+
+section() {
+  printf '\n## %s\n\n```\n' "$1"
+  shift
+  "$program" "$@" --help
+  printf '```\n'
+}
+
+section freevoxel
+for command in generate precompute transfer info verify render compare sheet; do
+  section "$command" "$command"
+done
+
+cat <<'TEXT'
+
+## Statistics
+
+Every command takes `--stats FILE.json` and writes what it did; of these keys those that apply:
+
+| key | meaning |
+|---|---|
+| `command`, `version` | the command as typed; the program's version |
+| `seconds` | one entry per stage, and `total` |
+| `threads` | that the program could use |
+| `backend`, `glRenderer` | what drew the splats: `gl` or `cpu`; what OpenGL calls itself |
+| `voxels`, `storedVoxels`, `visibleVoxels` | of the volume; in stored bricks; with opacity above 0 |
+| `nonFinite` | values that are NaN or infinite |
+| `fileBytes`, `bytesPerVoxel` | of the file read or written; divided by `voxels` |
+| `largestValueError` | by coding values as whole numbers, in data units |
+| `blocks`, `culledBlocks` | drawn (precompute: stored); outside the view |
+| `splats`, `culledSplats`, `fragments` | drawn; without a pixel; pixels that splats covered |
+| `quantum`, `passes` | what sums are multiples of; how often the picture was drawn until the sums proved exact |
+| `identical`, `psnr`, `ssim`, `rms`, `maxError`, `differingBytes`, `coveredPixels` | of `compare` |
+| `peakMemoryBytes` | largest resident memory of the process |
+| `warnings` | what the user was warned of |
+TEXT

@@ -1,0 +1,57 @@
+// What the cell footprint hands from the CPU to whatever draws it, in GLSL and C++ alike (docs/fidelity.md).
+#ifndef FREEVOXEL_SHADERS_SHARED_CELL_SEGMENT_H
+#define FREEVOXEL_SHADERS_SHARED_CELL_SEGMENT_H
+
+#include "shaders/shared/exact_math.h"
+#include "shaders/shared/language.h"
+
+FREEVOXEL_BEGIN_SHARED
+
+// A pixel's ray in index space, along its dominant axis a: at position s on that axis it is at baseB + s slopeB and
+// baseC + s slopeC on the next two (b = a + 1, c = a + 2, modulo 3). The same layout in std430.
+struct PixelRay {
+  float baseB, baseC;
+  float slopeB, slopeC;
+  // The part of the ray inside the volume's box and before the eye, in units of s; empty if sLow >= sHigh.
+  float sLow, sHigh;
+  // Way through the volume per unit of s, in shortest voxel edges.
+  float lengthPerPlane;
+  // Dominant axis 0..2, plus 4 if the eye lies towards higher s.
+  uint axisAndSide;
+};
+
+SHARED_CONSTANT uint kRayAxisMask = 3u;
+SHARED_CONSTANT uint kRayEyeAbove = 4u;
+
+// Entries of the classification table closer together than this are averaged by the density between them: the
+// difference of two integrals would lose its digits.
+SHARED_CONSTANT float kNearlyEqual = 0.5f;
+
+// Less than any extinction that a picture could show, in log2 per shortest voxel edge.
+SHARED_CONSTANT float kLeastExtinction = 1e-9f;
+
+// A place on the classification table: colour times extinction, and extinction in log2 per shortest voxel edge.
+struct TableValue {
+  float red, green, blue, extinction;
+};
+
+// A block as rays along one dominant axis a see it, with b and c as in PixelRay. Positions count voxels of the volume.
+struct CellLayout {
+  int originA, originB, originC;  // first voxel
+  int strideA, strideB, strideC;  // in the block's array, which starts at origin - 1
+  int firstA, endA;               // lower planes of the pieces that may see something
+  float lastB, lastC;             // of the volume's voxels
+  float ownLowB, ownHighB;        // pieces whose lower end lies in here belong to the block
+  float ownLowC, ownHighC;
+  int lit;      // 0 or 1: whether voxels have light of their own
+  int samples;  // where the block's array starts, in voxels
+};
+
+// What one block gives to one pixel; depth in log2.
+struct RaySums {
+  float red, green, blue, emission, depth;
+};
+
+FREEVOXEL_END_SHARED
+
+#endif

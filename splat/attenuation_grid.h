@@ -1,0 +1,58 @@
+// Attenuation of every voxel towards one point or direction: the eye or a light.
+#pragma once
+
+#include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "base/placement.h"
+#include "hierarchy/attenuation_file.h"
+#include "splat/classification_table.h"
+#include "splat/value_grid.h"
+
+namespace freevoxel {
+
+/// Where attenuation is wanted towards, in index space.
+struct Towards {
+  bool directional = false;
+  glm::dvec3 index{0.0};            ///< a position, or, if directional, a direction of any length
+  glm::dmat3 lengthFromIndex{1.0};  ///< columns: the voxel edges, in shortest voxel edges
+
+  static Towards point(const Placement& placement, glm::dvec3 world);
+  static Towards direction(const Placement& placement, glm::dvec3 world);
+
+  /// From a voxel to the target, in index units; not of unit length.
+  glm::dvec3 from(glm::dvec3 voxel) const { return directional ? index : index - voxel; }
+};
+
+/// Attenuation as 0..65535, x fastest.
+struct AttenuationGrid {
+  static constexpr float kUnit = 65535.0f;
+  std::vector<uint16_t> values;
+};
+
+/// How the 26 stored directions answer for one in between.
+enum class StoredLookup {
+  interpolated,  ///< face, edge and corner direction of its octant triangle (DESIGN section 3, look-up of A)
+  nearest,       ///< the one nearest by angle, as the paper has it
+};
+
+/// From the 26 stored directions; 1 where the file stored nothing.
+AttenuationGrid storedAttenuation(const AttenuationFile& file, const Towards& towards, StoredLookup lookup);
+
+/// Cubes of 8 voxels an edge in which, or within a cell of which, something is visible; x fastest.
+struct VisibleCubes {
+  static constexpr int kShift = 3;
+  glm::ivec3 dims{0};
+  std::vector<uint8_t> visible;
+};
+VisibleCubes findVisibleCubes(const ValueGrid& grid, const TransferFunction& transfer);
+
+/// Swept plane by plane from the target (DESIGN section 3, `swept`): the attenuation of the plane nearer to it,
+/// interpolated where the ray crosses, times what the segment between takes, its value running linearly. A target
+/// inside the volume is allowed. Same values for any thread count.
+AttenuationGrid sweptAttenuation(const ValueGrid& grid, const ClassificationTable& table, const VisibleCubes& cubes,
+                                 const Towards& towards);
+
+}  // namespace freevoxel

@@ -1,0 +1,55 @@
+// From a block's voxels to kernel splats (papers/freevoxels sections 3.3 and 5; DESIGN section 3, footprint `kernel`).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "shaders/shared/kernel_splat.h"
+#include "splat/attenuation_grid.h"
+#include "splat/light_grid.h"
+#include "splat/sums.h"
+#include "splat/value_grid.h"
+#include "splat/volume_view.h"
+#include "volume/transfer_function.h"
+
+namespace freevoxel {
+
+using shared::KernelSplat;
+static_assert(sizeof(KernelSplat) == 48 && offsetof(KernelSplat, conicXX) == 16 &&
+                  offsetof(KernelSplat, emissionR) == 32,
+              "vertex attributes are read at these offsets");
+
+/// Everything about a frame that its splats need. Built once per frame, then read by all threads.
+class KernelSetup {
+ public:
+  /// `classified[code]` for every code of the file; emission is divided by `quantum`.
+  KernelSetup(const VolumeView& view, std::vector<Classified> classified, Formula formula, float quantum);
+
+  struct Counts {
+    uint64_t culledSplats = 0;
+    uint64_t fragments = 0;
+  };
+
+  /// Appends the splats of the visible voxels of a block of edge^3 voxels that touch the image, x fastest.
+  void append(const ValueGrid& grid, const AttenuationGrid& attenuation, const LightGrid& light, glm::ivec3 origin,
+              int edge, std::vector<KernelSplat>& splats, Counts& counts) const;
+
+  /// Whether a splat of this block could touch the image. Never false for one that would.
+  bool mayTouchImage(glm::ivec3 origin, int edge) const;
+
+ private:
+  /// Way through the volume per plane of voxels towards a direction of view space.
+  float lengthPerPlane(glm::dvec3 towards) const;
+  bool makeSplat(glm::ivec3 index, const Classified& voxel, float attenuation, KernelSplat& splat,
+                 Counts& counts) const;
+
+  VolumeView view_;
+  std::vector<Classified> classified_;
+  Formula formula_;
+  float inverseQuantum_;
+  float orthographicPower_ = 1.0f;
+  double cellDiagonal_ = 0.0;  ///< longest diagonal of a cell, in shortest voxel edges
+  double kernelReach_ = 0.0;   ///< how far a kernel reaches from its voxel, at most
+};
+
+}  // namespace freevoxel

@@ -1,0 +1,19 @@
+// The rays of an image's pixels in the index space of a volume.
+#pragma once
+
+#include <vector>
+
+#include "base/camera.h"
+#include "base/placement.h"
+#include "shaders/shared/cell_segment.h"
+
+namespace freevoxel {
+
+using shared::PixelRay;
+static_assert(sizeof(PixelRay) == 32 && offsetof(PixelRay, sLow) == 16 && offsetof(PixelRay, axisAndSide) == 28,
+              "the shaders read rays at these offsets");
+
+/// One ray per pixel, row 0 first. Rays that miss the volume's box are empty.
+std::vector<PixelRay> pixelRays(const Placement& placement, glm::ivec3 dims, const Camera& camera);
+
+}  // namespace freevoxel

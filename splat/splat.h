@@ -1,0 +1,87 @@
+// Blocks to sums: the order-free renderer (papers/freevoxels sections 3.3, 4.1, 4.2 and 5; docs/fidelity.md).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "base/camera.h"
+#include "base/light.h"
+#include "base/progress.h"
+#include "hierarchy/attenuation_file.h"
+#include "splat/sums.h"
+#include "splat/value_grid.h"
+#include "volume/transfer_function.h"
+
+namespace freevoxel {
+
+enum class Backend { automatic, gl, cpu };
+
+/// What one splat covers.
+enum class Footprint {
+  cell,    ///< cells between voxels, traced and classified after interpolation, a block at a time
+  kernel,  ///< the paper's: a blending kernel round every voxel, integrated along the view ray
+};
+
+/// Where attenuation towards the eye comes from.
+enum class AttenuationSource {
+  automatic,  ///< stored if there is an attenuation file and the eye is outside the volume, else swept
+  stored,     ///< the 26 directions of the file, which run on to the outside even if the eye is inside
+  swept,      ///< one sweep over the values for this eye
+};
+
+/// The order in which blocks, and splats inside a block, are drawn. It changes no bit of the result.
+struct SplatOrder {
+  enum class Kind { hilbert, reverse, shuffle } kind = Kind::hilbert;
+  uint64_t seed = 0;  ///< of shuffle
+};
+
+struct SplatOptions {
+  Formula formula = Formula::normalised;
+  Footprint footprint = Footprint::cell;  ///< formula `paper` is defined for `kernel` only
+  AttenuationSource attenuation = AttenuationSource::automatic;
+  AttenuationSource lightAttenuation = AttenuationSource::automatic;  ///< the same, towards lamps
+  Lighting lighting;
+  SplatOrder order;
+  float firstQuantum = 0x1p-20f;  ///< raised by 4 until the sums prove exact; a power of two
+};
+
+struct SplatStatistics {
+  uint64_t blocks = 0;           ///< drawn
+  uint64_t culledBlocks = 0;     ///< outside the view frustum
+  uint64_t splats = 0;           ///< drawn: of cells, blocks; of kernels, voxels
+  uint64_t culledSplats = 0;     ///< of kernels: visible voxels off screen or nearer than the near plane
+  uint64_t fragments = 0;        ///< pixels that splats' bounding rectangles covered
+  int passes = 1;                ///< 1 + how often the quantum had to be raised
+  std::string backend;           ///< "gl" or "cpu"
+  std::string glRenderer;        ///< empty for cpu
+  std::string attenuation;       ///< towards the eye: "stored" or "swept"
+  std::string lightAttenuation;  ///< the same towards lamps; empty without any
+  double attenuationSeconds = 0, lightSeconds = 0, setupSeconds = 0, drawSeconds = 0;
+};
+
+struct SplatResult {
+  Sums sums;
+  SplatStatistics statistics;
+};
+
+/// Renders frames of one volume under one transfer function. Move-only.
+class Splatter {
+ public:
+  /// `grid` and `file` must outlive the splatter; `file` may be null (then attenuation is always swept). The opacities
+  /// of `transfer` must be those that the file was made with (opacityHash).
+  /// Throws InputError (transfer function), MachineError (no GL where it was asked for).
+  Splatter(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer, Backend backend);
+  ~Splatter();
+  Splatter(Splatter&& other) noexcept;
+  Splatter& operator=(Splatter&&) = delete;
+
+  /// Same bits for any order, thread count and backend. Throws InputError or MachineError.
+  SplatResult render(const Camera& camera, const SplatOptions& options, Progress& progress);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace freevoxel

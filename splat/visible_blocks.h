@@ -1,0 +1,23 @@
+// Which blocks have something to draw, and where in them.
+#pragma once
+
+#include <glm/vec3.hpp>
+#include <vector>
+
+#include "splat/value_grid.h"
+#include "volume/transfer_function.h"
+
+namespace freevoxel {
+
+/// A block of edge^3 voxels in which, or within a cell of which, a cell is visible.
+struct VisibleBlock {
+  glm::ivec3 origin{0};  ///< first voxel, a multiple of the edge
+  /// Cells, by their lower corner, outside which no piece of a ray that the block owns can see anything:
+  /// origin <= low < high <= origin + edge.
+  glm::ivec3 low{0}, high{0};
+};
+
+/// In the order of the Hilbert curve.
+std::vector<VisibleBlock> findVisibleBlocks(const ValueGrid& grid, const TransferFunction& transfer, int edge);
+
+}  // namespace freevoxel

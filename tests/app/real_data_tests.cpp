@@ -1,0 +1,88 @@
+// Real volumes through the whole line, each with the transfer function that shows what it is known for.
+#include <gtest/gtest.h>
+
+#include "base/compare.h"
+#include "base/image.h"
+#include "tests/app/program.h"
+#include "tests/support/test_data.h"
+
+namespace freevoxel::test {
+namespace {
+
+struct DataSet {
+  std::string name;      ///< of the test
+  std::string file;      ///< in volumes/
+  std::string options;   ///< what a raw file does not say
+  std::string transfer;  ///< in examples/transfer/
+  std::vector<int> dims;
+  double minPsnr;  ///< dB against the pre-classified ray caster; what kernels reach on such data, less one or two
+};
+
+const DataSet kDataSets[] = {
+    {"embryo", "embryo_256x256x256_uint8.raw.gz", "--dims 256,256,256 --type u8", "embryo.json", {256, 256, 256}, 32.0},
+    {"cthead",
+     "cthead_256x256x113_uint16_be.raw.gz",
+     "--dims 256,256,113 --type u16 --endian big --spacing 1,1,2",
+     "cthead.json",
+     {256, 256, 113},
+     24.0},
+    {"aneurism",
+     "aneurism_256x256x256_uint8.raw.gz",
+     "--dims 256,256,256 --type u8",
+     "aneurism.json",
+     {256, 256, 256},
+     25.0},
+    {"stent", "stent.nrrd", "", "stent.json", {128, 128, 256}, 28.0},
+    {"headsq", "headsq/quarter.nhdr", "", "headsq.json", {64, 64, 93}, 21.0},
+    {"nucleon", "nucleon/nucleon.nrrd", "", "nucleon.json", {41, 41, 41}, 42.0},
+};
+
+void PrintTo(const DataSet& data, std::ostream* stream) {
+  *stream << data.name;
+}
+
+class RealData : public ::testing::TestWithParam<DataSet> {
+ protected:
+  void SetUp() override {
+    if (!dataFolder()) GTEST_SKIP() << kNoData;
+    folder = temporaryFolder();
+    volume = *dataFolder() + "/volumes/" + GetParam().file + " " + GetParam().options;
+    transfer = sourceFolder() + "/examples/transfer/" + GetParam().transfer;
+  }
+
+  ProcessResult run(const std::string& call) const { return freevoxelDone(folder, words(call)); }
+  Image image(const std::string& name) const { return readImage(folder + "/" + name); }
+
+  std::string folder, volume, transfer;
+};
+
+TEST_P(RealData, becomesAPictureInAnyOrder) {
+  const auto info = nlohmann::json::parse(run("info --json " + volume).output);
+  EXPECT_EQ(info["dims"], GetParam().dims);
+  run("precompute " + volume + " --transfer " + transfer + " --classification voxel -o data.fvx");
+  run("verify data.fvx");
+
+  const std::string render = "render data.fvx --size 500x400 --orbit 40,25 ";
+  run(render + "--backend cpu -o picture.exr --sums sums.exr");
+  const Image sums = image("sums.exr");
+  const Image picture = image("picture.exr");
+  for (const std::string how :
+       {"--backend cpu --order reverse --threads 1", "--backend cpu --order shuffle:1 --threads 2",
+        "--backend gl --order hilbert --threads 2", "--backend gl --order shuffle:2 --threads 3"}) {
+    run(render + how + " -o other.exr --sums other_sums.exr");
+    EXPECT_TRUE(compareImages(image("other_sums.exr"), sums).identical) << how;
+    EXPECT_TRUE(compareImages(image("other.exr"), picture).identical) << how;
+  }
+
+  run(render + "--formula raycast --raycast pre --step 0.25 -o reference.exr");
+  const ImageDifference difference = compareImages(picture, image("reference.exr"));
+  EXPECT_GT(difference.coveredPixels, 5000u);
+  EXPECT_GE(difference.psnr, GetParam().minPsnr);
+  RecordProperty("psnr", std::to_string(difference.psnr));
+}
+
+INSTANTIATE_TEST_SUITE_P(DataSets, RealData, ::testing::ValuesIn(kDataSets),
+                         [](const auto& testInfo) { return testInfo.param.name; });
+
+}  // namespace
+}  // namespace freevoxel::test

@@ -1,0 +1,59 @@
+// Files written by earlier versions stay readable, byte for byte. One file per version of the format, never rewritten.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <array>
+
+#include "hierarchy/attenuation_file.h"
+#include "precompute/sweep.h"
+#include "shaders/shared/directions.h"
+#include "tests/precompute/test_volumes.h"
+#include "tests/support/test_data.h"
+
+namespace freevoxel {
+namespace {
+
+/// What tests/hierarchy/data/version1.fvx was made of.
+Volume frozenVolume() {
+  return test::makeVolume<uint8_t>(ValueType::u8, {5, 7, 11}, [](int x, int y, int z) {
+    return uint8_t((x * 37 + y * 11 + z * 23 + x * y * z) % 256);
+  });
+}
+
+TEST(FrozenFile, version1) {
+  const AttenuationFile file(test::sourceFolder() + "/tests/hierarchy/data/version1.fvx");
+  file.verify();
+  const Volume volume = frozenVolume();
+  const glm::ivec3 dims = volume.header.dims;
+  const TransferFunction transfer = test::veilAndRamp();
+  EXPECT_EQ(file.dims(), dims);
+  EXPECT_EQ(file.placement().spacing, volume.header.placement.spacing);
+  EXPECT_EQ(file.placement().origin, volume.header.placement.origin);
+  EXPECT_EQ(file.classification(), Classification::voxel);
+  EXPECT_EQ(file.layout(), Layout::dense);
+  EXPECT_EQ(file.brickEdge(), 8);
+  EXPECT_EQ(file.command(), "freevoxel precompute frozen.nrrd --classification voxel --brick 8");
+  EXPECT_EQ(transferFunctionJson(file.transfer()), transferFunctionJson(transfer));
+  ASSERT_EQ(file.brickCount(), 2u);
+
+  const auto codes = encodeValues(volume, file.coding());
+  std::array<std::vector<uint8_t>, shared::kDirectionCount> planes;
+  test::FunctionSink sink([&](const AttenuationSlab& slab) {
+    planes[size_t(slab.direction)].assign(slab.bytes.begin(), slab.bytes.end());
+  });
+  sweepAttenuation(codes, dims, *makeSegmentDepth(Classification::voxel, transfer, file.coding()), dims.z, sink);
+  for (size_t b = 0; b < file.brickCount(); ++b) {
+    const BrickView brick = file.brick(b);
+    for (size_t step = 0; step < brick.curve.size(); ++step) {
+      const glm::ivec3 p = brick.origin + glm::ivec3(brick.curve[step].x, brick.curve[step].y, brick.curve[step].z);
+      if (p.x >= dims.x || p.y >= dims.y || p.z >= dims.z) continue;
+      const uint64_t i = linearIndex(p, dims);
+      ASSERT_EQ(brick.code(step), codes[i]);
+      for (size_t k = 0; k < planes.size(); ++k)
+        ASSERT_EQ(brick.attenuations[k][step], planes[k][i]);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace freevoxel

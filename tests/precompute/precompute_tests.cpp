@@ -1,0 +1,110 @@
+// Writing attenuation files: what is promised about the file as a whole. Contents are read back in tests/hierarchy.
+#include "precompute/precompute.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <cmath>
+#include <limits>
+
+#include "base/error.h"
+#include "tests/precompute/test_volumes.h"
+#include "tests/support/test_data.h"
+
+namespace freevoxel {
+namespace {
+
+/// Counts what it is told.
+struct CountingProgress : Progress {
+  uint64_t total = 0, advanced = 0;
+  int begun = 0, ended = 0;
+  void begin(const std::string&, uint64_t steps, const std::string&) override {
+    ++begun;
+    total += steps;
+  }
+  void advance(uint64_t steps) override { advanced += steps; }
+  void end() override { ++ended; }
+};
+
+TEST(Precompute, sameBytesForAnyNumberOfThreads) {
+  const Volume volume = test::randomBytes({17, 25, 33}, 21);
+  const std::string folder = test::temporaryFolder();
+  const int before = omp_get_max_threads();
+  for (const auto classification : {Classification::voxel, Classification::preintegrated}) {
+    std::string expected;
+    for (const int threads : {1, 2, 3, 8}) {
+      omp_set_num_threads(threads);
+      PrecomputeOptions options;
+      options.classification = classification;
+      options.brickEdge = 8;
+      precompute(volume, test::veilAndRamp(), folder + "/a.fvx", options, test::silentProgress());
+      const std::string bytes = test::readBytes(folder + "/a.fvx");
+      if (threads == 1) expected = bytes;
+      EXPECT_TRUE(bytes == expected) << threads << " threads";
+    }
+  }
+  omp_set_num_threads(before);
+}
+
+TEST(Precompute, reportsItsFiguresAndProgress) {
+  const Volume volume = test::randomBytes({5, 7, 11}, 22);
+  const std::string folder = test::temporaryFolder();
+  CountingProgress progress;
+  const auto result = precompute(volume, test::veilAndRamp(), folder + "/a.fvx", {}, progress);
+  EXPECT_EQ(result.voxels, 385u);
+  EXPECT_EQ(result.bricks, 1u);
+  EXPECT_EQ(result.storedVoxels, 385u);
+  uint64_t visible = 0;
+  for (uint64_t i = 0; i < 385; ++i)
+    visible += test::veilAndRamp().opacityAt(volume.value(i)) > 0.0 ? 1 : 0;
+  EXPECT_EQ(result.visibleVoxels, visible);
+  EXPECT_EQ(result.fileBytes, test::readBytes(folder + "/a.fvx").size());
+  EXPECT_EQ(result.nonFinite, 0u);
+  EXPECT_EQ(result.largestValueError, 0.0);
+  EXPECT_EQ(progress.begun, 1);
+  EXPECT_EQ(progress.ended, 1);
+  EXPECT_EQ(progress.total, 385u * 26u);
+  EXPECT_EQ(progress.advanced, progress.total);
+}
+
+TEST(Precompute, statesTheLossOfFloatValuesAndCountsNonFiniteOnes) {
+  const Volume volume = test::makeVolume<float>(ValueType::f32, {5, 7, 11}, [](int x, int y, int z) {
+    if (x == 1 && y == 2 && z == 3) return std::numeric_limits<float>::quiet_NaN();
+    if (x == 2 && y == 2 && z == 3) return std::numeric_limits<float>::infinity();
+    return float(x) * 0.1f + float(y) * 0.013f - float(z) * 0.05f;
+  });
+  const TransferFunction transfer = test::veilAndRamp(-0.5, 0.5);
+  const std::string path = test::temporaryFolder() + "/a.fvx";
+  const auto result = precompute(volume, transfer, path, {}, test::silentProgress());
+  EXPECT_EQ(result.nonFinite, 2u);
+  EXPECT_GT(result.largestValueError, 0.0);
+  EXPECT_LE(result.largestValueError, 0.5 / 65535 * 1.0000001);
+}
+
+TEST(Precompute, nothingVisibleStillMakesAFile) {
+  TransferFunction transfer;
+  transfer.points = {{0.0, {}, 0.0}};
+  const std::string path = test::temporaryFolder() + "/a.fvx";
+  const auto result = precompute(test::randomBytes({5, 7, 11}, 1), transfer, path, {}, test::silentProgress());
+  EXPECT_EQ(result.bricks, 0u);
+  EXPECT_EQ(result.storedVoxels, 0u);
+}
+
+TEST(Precompute, refusesWhatItCannotWrite) {
+  const Volume volume = test::randomBytes({5, 7, 11}, 1);
+  const std::string folder = test::temporaryFolder();
+  const auto attempt = [&](const std::string& path, const PrecomputeOptions& options) {
+    precompute(volume, test::veilAndRamp(), path, options, test::silentProgress());
+  };
+  PrecomputeOptions options;
+  options.brickEdge = 12;
+  EXPECT_THROW(attempt(folder + "/a.fvx", options), InputError);
+  options = {};
+  options.layout = Layout::compact;
+  EXPECT_THROW(attempt(folder + "/a.fvx", options), InputError);
+  EXPECT_THROW(attempt(folder + "/missing/a.fvx", {}), MachineError);
+  EXPECT_TRUE(test::listFolder(folder).empty());
+}
+
+}  // namespace
+}  // namespace freevoxel

@@ -1,0 +1,242 @@
+// The sweeps against rays marched one by one, and against closed forms.
+#include "precompute/sweep.h"
+
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "shaders/shared/directions.h"
+#include "tests/precompute/test_volumes.h"
+#include "volume/value_codes.h"
+
+namespace freevoxel {
+namespace {
+
+using Planes = std::array<std::vector<uint8_t>, shared::kDirectionCount>;
+
+/// Attenuation of all voxels in volume order, per direction. Fails the test unless every byte arrives exactly once.
+Planes sweepAll(std::span<const uint16_t> codes, glm::ivec3 dims, const SegmentDepth& segments, int slabPlanes) {
+  Planes planes;
+  std::array<std::vector<int>, shared::kDirectionCount> times;
+  for (auto& plane : planes)
+    plane.resize(voxelCount(dims));
+  for (auto& counts : times)
+    counts.resize(size_t(dims.z));
+  test::FunctionSink sink([&](const AttenuationSlab& slab) {
+    const size_t planeVoxels = size_t(dims.x) * size_t(dims.y);
+    ASSERT_EQ(slab.bytes.size(), size_t(slab.planes) * planeVoxels);
+    ASSERT_EQ(slab.firstPlane % slabPlanes, 0);
+    auto& plane = planes[size_t(slab.direction)];
+    std::copy(slab.bytes.begin(), slab.bytes.end(), plane.begin() + ptrdiff_t(size_t(slab.firstPlane) * planeVoxels));
+    for (int i = 0; i < slab.planes; ++i)
+      ++times[size_t(slab.direction)][size_t(slab.firstPlane + i)];
+  });
+  sweepAttenuation(codes, dims, segments, slabPlanes, sink);
+  for (const auto& counts : times) {
+    EXPECT_TRUE(std::all_of(counts.begin(), counts.end(), [](int count) { return count == 1; }));
+  }
+  return planes;
+}
+
+bool inside(glm::ivec3 p, glm::ivec3 dims) {
+  return p.x >= 0 && p.y >= 0 && p.z >= 0 && p.x < dims.x && p.y < dims.y && p.z < dims.z;
+}
+
+/// One ray: fixed-point and exact depth of the way from voxel p to the outside.
+struct RayDepth {
+  FixedDepth fixed = 0;
+  double exact = 0.0;  ///< natural
+};
+RayDepth marchRay(std::span<const uint16_t> codes, glm::ivec3 dims, glm::ivec3 p, int direction,
+                  const TransferFunction& transfer, const ValueCoding& coding) {
+  const glm::ivec3 step(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction));
+  uint64_t sum = 0;
+  RayDepth ray;
+  for (p += step; inside(p, dims); p += step) {
+    const double extinction = transfer.extinctionAt(coding.decode(codes[linearIndex(p, dims)]));
+    sum += fixedDepth(extinction);
+    ray.exact += extinction;
+  }
+  ray.fixed = FixedDepth(std::min<uint64_t>(sum, 0xffffffffu));
+  return ray;
+}
+
+struct SweepCase {
+  glm::ivec3 dims;
+  int slabPlanes;
+};
+class Sweep : public testing::TestWithParam<SweepCase> {};
+INSTANTIATE_TEST_SUITE_P(Dims, Sweep,
+                         testing::Values(SweepCase{{5, 7, 11}, 8}, SweepCase{{1, 1, 1}, 16}, SweepCase{{17, 3, 33}, 16},
+                                         SweepCase{{16, 16, 17}, 16}, SweepCase{{1, 9, 2}, 1}, SweepCase{{23, 1, 1}, 8},
+                                         SweepCase{{1, 1, 23}, 8}, SweepCase{{2, 3, 64}, 32},
+                                         SweepCase{{40, 2, 5}, 3}));
+
+TEST_P(Sweep, equalsRaysMarchedOneByOne) {
+  const auto [dims, slabPlanes] = GetParam();
+  const Volume volume = test::randomBytes(dims, 11);
+  const TransferFunction transfer = test::veilAndRamp();
+  const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
+  const auto codes = encodeValues(volume, coding);
+  const Planes planes = sweepAll(codes, dims, *makeSegmentDepth(Classification::voxel, transfer, coding), slabPlanes);
+  for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
+    for (int z = 0; z < dims.z; ++z) {
+      for (int y = 0; y < dims.y; ++y) {
+        for (int x = 0; x < dims.x; ++x) {
+          const RayDepth ray = marchRay(codes, dims, {x, y, z}, direction, transfer, coding);
+          const uint8_t found = planes[size_t(direction)][linearIndex({x, y, z}, dims)];
+          ASSERT_EQ(found, attenuationCode(ray.fixed)) << direction << ": " << x << ' ' << y << ' ' << z;
+          ASSERT_LE(std::abs(found - std::lround(255.0 * std::exp(-ray.exact))), 1);
+        }
+      }
+    }
+  }
+}
+
+TEST_P(Sweep, preintegratedEqualsSegmentsAddedOneByOne) {
+  const auto [dims, slabPlanes] = GetParam();
+  const Volume volume = test::randomBytes(dims, 12);
+  const TransferFunction transfer = test::veilAndRamp();
+  const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
+  const auto codes = encodeValues(volume, coding);
+  const auto segments = makeSegmentDepth(Classification::preintegrated, transfer, coding);
+  const Planes planes = sweepAll(codes, dims, *segments, slabPlanes);
+  for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
+    const glm::ivec3 step(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction));
+    for (uint64_t i = 0; i < codes.size(); ++i) {
+      const glm::ivec3 p(int(i % uint64_t(dims.x)), int(i / uint64_t(dims.x) % uint64_t(dims.y)),
+                         int(i / (uint64_t(dims.x) * uint64_t(dims.y))));
+      uint64_t sum = 0;
+      for (glm::ivec3 q = p; inside(q + step, dims); q += step) {
+        FixedDepth depth = 0;
+        segments->row({&codes[linearIndex(q, dims)], 1}, {&codes[linearIndex(q + step, dims)], 1}, &depth);
+        sum += depth;
+      }
+      ASSERT_EQ(planes[size_t(direction)][i], attenuationCode(FixedDepth(std::min<uint64_t>(sum, 0xffffffffu))));
+    }
+  }
+}
+
+TEST_P(Sweep, isTheSameForAnyNumberOfThreadsAndSlabs) {
+  const glm::ivec3 dims = GetParam().dims;
+  const Volume volume = test::randomBytes(dims, 13);
+  const TransferFunction transfer = test::veilAndRamp();
+  const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
+  const auto codes = encodeValues(volume, coding);
+  const auto segments = makeSegmentDepth(Classification::voxel, transfer, coding);
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const Planes expected = sweepAll(codes, dims, *segments, dims.z);
+  for (const int threads : {2, 3, 8}) {
+    omp_set_num_threads(threads);
+    for (const int slabPlanes : {1, 2, 8, 64})
+      EXPECT_EQ(sweepAll(codes, dims, *segments, slabPlanes), expected);
+  }
+  omp_set_num_threads(before);
+}
+
+/// Steps that stay inside from p along a direction.
+int stepsInside(glm::ivec3 p, glm::ivec3 dims, int direction) {
+  const glm::ivec3 step(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction));
+  int steps = 0;
+  while (inside(p + step * (steps + 1), dims))
+    ++steps;
+  return steps;
+}
+
+TEST(SweepClosedForm, uniformBoxAttenuatesByPowersOfT) {
+  const glm::ivec3 dims(5, 7, 11);
+  const double opacity = 0.07;
+  TransferFunction transfer;
+  transfer.points = {{0.0, {}, opacity}};
+  const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
+  const std::vector<uint16_t> codes(voxelCount(dims), 200);
+  for (const auto classification : {Classification::voxel, Classification::preintegrated}) {
+    const Planes planes = sweepAll(codes, dims, *makeSegmentDepth(classification, transfer, coding), 8);
+    for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
+      for (int z = 0; z < dims.z; ++z) {
+        for (int y = 0; y < dims.y; ++y) {
+          for (int x = 0; x < dims.x; ++x) {
+            const int steps = stepsInside({x, y, z}, dims, direction);
+            const double expected = 255.0 * std::pow(1.0 - opacity, steps);
+            ASSERT_NEAR(planes[size_t(direction)][linearIndex({x, y, z}, dims)], expected, 0.5 + 0.0045);
+          }
+        }
+      }
+    }
+  }
+}
+
+TEST(SweepClosedForm, opaqueRowSaturatesAndEmptyOneIsClear) {
+  TransferFunction transfer;
+  transfer.points = {{0.0, {}, 0.0}, {255.0, {}, 1.0}};
+  const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
+  const auto segments = makeSegmentDepth(Classification::voxel, transfer, coding);
+  const glm::ivec3 dims(300, 1, 2);
+  const Planes opaque = sweepAll(std::vector<uint16_t>(600, 255), dims, *segments, 16);
+  const Planes empty = sweepAll(std::vector<uint16_t>(600, 0), dims, *segments, 16);
+  const auto along = size_t(shared::directionIndex(1, 0, 0));
+  for (size_t x = 0; x < 300; ++x) {
+    EXPECT_EQ(opaque[along][x], x == 299 ? 255 : 0);
+    EXPECT_EQ(empty[along][x], 255);
+  }
+}
+
+TEST(SweepClosedForm, singleOpaqueVoxelShadowsTheVoxelsBehindItOnly) {
+  TransferFunction transfer;
+  transfer.points = {{0.0, {}, 0.0}, {255.0, {}, 1.0}};
+  const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
+  const glm::ivec3 dims(7, 9, 8), middle(3, 5, 4);
+  std::vector<uint16_t> codes(voxelCount(dims));
+  codes[linearIndex(middle, dims)] = 255;
+  const Planes planes = sweepAll(codes, dims, *makeSegmentDepth(Classification::voxel, transfer, coding), 8);
+  for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
+    const glm::ivec3 step(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction));
+    std::vector<uint8_t> expected(codes.size(), 255);
+    for (glm::ivec3 p = middle - step; inside(p, dims); p -= step)
+      expected[linearIndex(p, dims)] = 0;
+    EXPECT_EQ(planes[size_t(direction)], expected) << direction;
+  }
+}
+
+/// Checks the order of calls that AttenuationSink promises.
+class OrderSink final : public AttenuationSink {
+ public:
+  explicit OrderSink(int slabPlanes) : slabPlanes_(slabPlanes) {}
+  void receive(const AttenuationSlab& slab) override {
+    const std::lock_guard lock(mutex_);
+    ++received_[{sweepPass(slab.direction), slab.firstPlane}];
+  }
+  void complete(int pass, int firstPlane) override {
+    EXPECT_EQ((received_[{pass, firstPlane}]), kDirectionsPerSection);
+    EXPECT_EQ((received_.count({pass, firstPlane + (pass == 0 ? slabPlanes_ : -slabPlanes_)})), 0u);
+    ++completed;
+  }
+  int completed = 0;
+
+ private:
+  int slabPlanes_;
+  std::mutex mutex_;
+  std::map<std::pair<int, int>, int> received_;
+};
+
+TEST(SweepOrder, aPassCompletesSlabAfterSlab) {
+  const glm::ivec3 dims(5, 7, 11);
+  const TransferFunction transfer = test::veilAndRamp();
+  const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
+  const std::vector<uint16_t> codes(voxelCount(dims));
+  OrderSink sink(4);
+  sweepAttenuation(codes, dims, *makeSegmentDepth(Classification::voxel, transfer, coding), 4, sink);
+  EXPECT_EQ(sink.completed, 2 * 3);
+}
+
+}  // namespace
+}  // namespace freevoxel

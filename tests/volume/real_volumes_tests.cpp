@@ -1,0 +1,220 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <glm/glm.hpp>
+#include <set>
+
+#include "tests/support/test_data.h"
+#include "tests/volume/volume_files.h"
+
+namespace freevoxel::test {
+
+namespace {
+
+VolumeOptions raw(glm::ivec3 dims, ValueType type, ByteOrder order = ByteOrder::little) {
+  VolumeOptions options;
+  options.dims = dims;
+  options.type = type;
+  options.byteOrder = order;
+  return options;
+}
+
+class RealVolumes : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!dataFolder()) GTEST_SKIP() << kNoData;
+  }
+
+  static Volume read(const std::string& name, const VolumeOptions& options = {}) {
+    return readVolume(*dataFolder() + "/volumes/" + name, options);
+  }
+
+  static void expectStatistics(const Volume& volume, double low, double high, double sum) {
+    const ValueStatistics statistics = valueStatistics(volume);
+    EXPECT_EQ(statistics.low, low);
+    EXPECT_EQ(statistics.high, high);
+    EXPECT_EQ(statistics.nonFinite, 0u);
+    if (isFloatingPoint(volume.header.type)) {
+      EXPECT_NEAR(statistics.sum, sum, 1e-9 * std::abs(sum));
+    } else {
+      EXPECT_EQ(statistics.sum, sum);
+    }
+  }
+};
+
+}  // namespace
+
+TEST_F(RealVolumes, embryo) {
+  const Volume volume = read("embryo_256x256x256_uint8.raw.gz", raw({256, 256, 256}, ValueType::u8));
+  expectStatistics(volume, 0.0, 197.0, 63724611.0);
+}
+
+TEST_F(RealVolumes, aneurism) {
+  const Volume volume = read("aneurism_256x256x256_uint8.raw.gz", raw({256, 256, 256}, ValueType::u8));
+  expectStatistics(volume, 0.0, 255.0, 17938365.0);
+}
+
+TEST_F(RealVolumes, ctHead) {
+  const Volume volume =
+      read("cthead_256x256x113_uint16_be.raw.gz", raw({256, 256, 113}, ValueType::u16, ByteOrder::big));
+  expectStatistics(volume, 0.0, 3272.0, 2810724494.0);
+}
+
+TEST_F(RealVolumes, hydrogen) {
+  const Volume volume = read("hydrogen_atom_128x128x128_uint8.raw.gz", raw({128, 128, 128}, ValueType::u8));
+  expectStatistics(volume, 0.0, 250.0, 5990975.0);
+}
+
+TEST_F(RealVolumes, vorticity) {
+  const Volume volume = read("vorticity_128x128x41_float32_le.raw.gz", raw({128, 128, 41}, ValueType::f32));
+  expectStatistics(volume, -0.0002043386484729126, 0.0002281117340316996, -0.5701328042378263);
+}
+
+TEST_F(RealVolumes, stent) {
+  const Volume volume = read("stent.nrrd");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(128, 128, 256));
+  EXPECT_EQ(volume.header.type, ValueType::f32);
+  EXPECT_EQ(volume.header.placement.spacing, glm::dvec3(1.0));
+  expectStatistics(volume, 0.0, 1.0, 74235.45305449888);
+  std::set<double> distinct;
+  for (uint64_t i = 0; i < volume.header.voxels(); ++i)
+    distinct.insert(volume.value(i));
+  EXPECT_EQ(distinct.size(), 33u);
+}
+
+TEST_F(RealVolumes, headsq) {
+  const Volume volume = read("headsq/quarter.nhdr");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(64, 64, 93));
+  EXPECT_EQ(volume.header.type, ValueType::i16);
+  EXPECT_EQ(volume.header.placement.spacing, glm::dvec3(3.2, 3.2, 1.5));
+  EXPECT_EQ(volume.header.placement.direction, glm::dmat3(1.0));
+  expectStatistics(volume, 0.0, 3926.0, 193392317.0);
+}
+
+TEST_F(RealVolumes, nucleon) {
+  const Volume volume = read("nucleon/nucleon.nrrd");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(41, 41, 41));
+  expectStatistics(volume, 0.0, 249.0, 2715326.0);
+}
+
+TEST_F(RealVolumes, nucleonByItsDatHeader) {
+  const Volume volume = read("nucleon/nucleon.dat");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(41, 41, 41));
+  EXPECT_EQ(volume.header.placement.spacing, glm::dvec3(1.0));
+  EXPECT_EQ(volume.data, read("nucleon/nucleon.nrrd").data);
+}
+
+TEST_F(RealVolumes, carp) {
+  const Volume volume = read("carp.nii.gz");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(256, 512, 256));
+  EXPECT_EQ(volume.header.type, ValueType::u8);
+  EXPECT_EQ(volume.header.placement.spacing, glm::dvec3(1.0));
+  EXPECT_EQ(volume.header.placement.origin, glm::dvec3(-127.5, -255.5, -127.5));
+  expectStatistics(volume, 0.0, 254.0, 423854130.0);
+}
+
+TEST_F(RealVolumes, brain) {
+  const Volume volume = read("brain_ch256.nii.gz");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(208, 256, 219));
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_NEAR(volume.header.placement.spacing[axis], 0.72, 1e-6);
+  EXPECT_EQ(volume.header.placement.origin, glm::dvec3(-75.0, -107.0, -69.5));
+  expectStatistics(volume, 0.0, 127.0, 402889898.0);
+}
+
+TEST_F(RealVolumes, avg152LeftAndRightByItsLetters) {
+  const Volume volume = read("avg152T1_RL_bigendian.nii.gz");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(91, 109, 91));
+  EXPECT_EQ(volume.header.type, ValueType::u8);
+  EXPECT_EQ(volume.header.placement.spacing, glm::dvec3(2.0));
+  expectStatistics(volume, 0.0, 255.0, 74825382.0);
+  // The bars are letters, an L and an R. In the row through their tops the L shows its stem only, the R its bowl.
+  int left = 0, right = 0;
+  for (int x = 0; x < volume.header.dims.x; ++x) {
+    const glm::ivec3 p(x, 66, 14);
+    if (volume.value(linearIndex(p, volume.header.dims)) != 255.0) continue;
+    ++(glm::dvec3(volume.header.placement.worldFromIndex() * glm::dvec4(p, 1.0)).x < 0.0 ? left : right);
+  }
+  EXPECT_EQ(left, 6);
+  EXPECT_GT(right, 20);
+}
+
+TEST_F(RealVolumes, frogtissue) {
+  const Volume volume = read("frogtissue/frogtissue.mhd");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(500, 470, 136));
+  EXPECT_EQ(volume.header.placement.spacing, glm::dvec3(1.0, 1.0, 1.5));
+  expectStatistics(volume, 0.0, 29.0, 12279472.0);
+}
+
+TEST_F(RealVolumes, neghip) {
+  const Volume volume = read("neghip.mha");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(70, 70, 70));
+  EXPECT_EQ(volume.header.placement.spacing, glm::dvec3(1.0));
+  expectStatistics(volume, 0.0, 255.0, 4824177.0);
+  // A border of three voxels of 0.
+  for (uint64_t i = 0; i < volume.header.voxels(); ++i) {
+    const glm::ivec3 p(int(i % 70), int(i / 70 % 70), int(i / 4900));
+    const bool border = glm::any(glm::lessThan(p, glm::ivec3(3))) || glm::any(glm::greaterThan(p, glm::ivec3(66)));
+    ASSERT_TRUE(!border || volume.value(i) == 0.0);
+  }
+}
+
+TEST_F(RealVolumes, carotid) {
+  const Volume volume = read("carotid.vtk");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(76, 49, 45));
+  EXPECT_EQ(volume.header.type, ValueType::f32);
+  EXPECT_EQ(volume.header.placement.spacing, glm::dvec3(1.0));
+  EXPECT_EQ(volume.header.placement.origin, glm::dvec3(100.0, 80.0, 1.0));
+  expectStatistics(volume, 0.0, 580.0, 16598647.0);
+  VolumeOptions flow;
+  flow.component = "vectors.2";
+  expectStatistics(read("carotid.vtk", flow), -17.465517044067383, 9.759259223937988, 9407.890808553379);
+}
+
+TEST_F(RealVolumes, dicomSeries) {
+  const TestReader reader;
+  const Volume volume = read("dicom_t1w");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(274, 384, 96));
+  EXPECT_EQ(volume.header.type, ValueType::i16);
+  EXPECT_NEAR(volume.header.placement.spacing.x, 0.699988, 1e-6);
+  EXPECT_NEAR(volume.header.placement.spacing.y, 0.666667, 1e-6);
+  EXPECT_NEAR(volume.header.placement.spacing.z, 2.6667, 1e-4);
+  expectStatistics(volume, 0.0, 231.0, 111486157.0);
+  // Oblique: the first slice's position and orientation as its file has them, LPS turned into RAS.
+  const Placement& placement = volume.header.placement;
+  EXPECT_LT(glm::distance(placement.origin, glm::dvec3(91.449586, 160.060359, -142.505487)), 1e-5);
+  EXPECT_LT(glm::distance(placement.direction[0], glm::dvec3(-0.99903218, 0.02178838, 0.03820965)), 1e-6);
+  EXPECT_LT(glm::distance(placement.direction[1], glm::dvec3(-0.02651948, -0.99141387, -0.12804396)), 1e-6);
+  const glm::dvec3 last(placement.worldFromIndex() * glm::dvec4(0.0, 0.0, 95.0, 1.0));
+  EXPECT_LT(glm::distance(last, glm::dvec3(100.339484, 127.397247, 108.556004)), 1e-3);
+}
+
+TEST_F(RealVolumes, smoke) {
+  const TestReader reader;
+  const Volume volume = readVolume(*dataFolder() + "/vdb/smoke.vdb");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(111, 222, 112));
+  EXPECT_EQ(volume.header.type, ValueType::f32);
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_NEAR(volume.header.placement.spacing[axis], 0.47619, 1e-5);
+  expectStatistics(volume, 0.0, 5.71484375, 171499.69552135468);
+  uint64_t active = 0;
+  for (uint64_t i = 0; i < volume.header.voxels(); ++i)
+    active += volume.value(i) > 0.0;
+  EXPECT_EQ(active, 1049275u);
+}
+
+TEST_F(RealVolumes, sphere) {
+  const TestReader reader;
+  const Volume volume = readVolume(*dataFolder() + "/vdb/sphere.vdb");
+  EXPECT_EQ(volume.header.dims, glm::ivec3(125, 125, 125));
+  EXPECT_NEAR(volume.header.placement.spacing.x, 0.05, 1e-9);
+  uint64_t active = 0;
+  for (uint64_t i = 0; i < volume.header.voxels(); ++i)
+    active += std::abs(volume.value(i)) < 0.14999;
+  EXPECT_EQ(active, 270638u);
+  // The middle is inside, a corner outside.
+  EXPECT_NEAR(volume.value(linearIndex({62, 62, 62}, volume.header.dims)), -0.15, 1e-4);
+  EXPECT_NEAR(volume.value(0), 0.15, 1e-4);
+}
+
+}  // namespace freevoxel::test
