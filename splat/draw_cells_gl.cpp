@@ -37,6 +37,7 @@ class GlCellCanvas final : public CellCanvas {
   void clear() override { targets_.clear(); }
 
   void draw(const CellFrame& frame, std::span<const VisibleBlock> blocks, CellCounts& counts) override {
+    glFinish();  // as in drawBatch
     replace(rays_, bytesOf(*frame.rays));
     replace(integral_, bytesOf(frame.table->integral));
     replace(density_, bytesOf(frame.table->density));
@@ -94,6 +95,8 @@ class GlCellCanvas final : public CellCanvas {
       if (lit)
         gatherLight(*frame.light, frame.grid->dims, block.origin, frame.edge, std::span(lights).subspan(start, voxels));
     }
+    // llvmpipe does not know that a fragment shader still reads a storage buffer: what is drawn must be done first.
+    glFinish();
     replace(layouts_, bytesOf(layouts));
     replace(samples_, bytesOf(samples));
     replace(lights_, bytesOf(lights));

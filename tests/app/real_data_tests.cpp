@@ -62,7 +62,11 @@ TEST_P(RealData, becomesAPictureInAnyOrder) {
   run("precompute " + volume + " --transfer " + transfer + " --classification voxel -o data.fvx");
   run("verify data.fvx");
 
-  const std::string render = "render data.fvx --size 500x400 --orbit 40,25 ";
+  const std::string view = "render data.fvx --size 500x400 --orbit 40,25 ";
+  const std::string render = view + "--footprint kernel ";
+  run(view + "--backend cpu -o cells.exr --sums cell_sums.exr");
+  run(view + "--backend gl --order shuffle:3 -o gl_cells.exr --sums gl_cell_sums.exr");
+  EXPECT_TRUE(compareImages(image("gl_cell_sums.exr"), image("cell_sums.exr")).identical);
   run(render + "--backend cpu -o picture.exr --sums sums.exr");
   const Image sums = image("sums.exr");
   const Image picture = image("picture.exr");
@@ -74,7 +78,7 @@ TEST_P(RealData, becomesAPictureInAnyOrder) {
     EXPECT_TRUE(compareImages(image("other.exr"), picture).identical) << how;
   }
 
-  run(render + "--formula raycast --raycast pre --step 0.25 -o reference.exr");
+  run(view + "--formula raycast --raycast pre --step 0.25 -o reference.exr");
   const ImageDifference difference = compareImages(picture, image("reference.exr"));
   EXPECT_GT(difference.coveredPixels, 5000u);
   EXPECT_GE(difference.psnr, GetParam().minPsnr);

@@ -97,6 +97,18 @@ TEST(Exactness, CellsInPerspective) {
   }
 }
 
+// More blocks than pass through the buffers at a time: what a batch draws must not be overwritten by the next.
+TEST(Exactness, CellsOfManyBatches) {
+  const Scene scene = makeScene(
+      makeVolume({150, 140, 110}, glm::dvec3(1.0), [](int x, int y, int z) { return (x * 5 + y * 3 + z * 7) % 256; }),
+      whiteRamp(0.02), 16, Classification::preintegrated);
+  const Camera camera = randomViews(scene.bounds(), 1, {60, 50}).front();
+  const SplatResult cpu = splatScene(scene, camera, {}, Backend::cpu);
+  const SplatResult gl = splatScene(scene, camera, {}, Backend::gl);
+  EXPECT_GT(cpu.statistics.blocks, 90u);
+  EXPECT_TRUE(sameBits(cpu.sums.image, gl.sums.image));
+}
+
 TEST(Exactness, CellsOrthographic) {
   const Scene scene = blockyScene();
   for (const double azimuth : {0.0, 0.7, 3.0}) {
