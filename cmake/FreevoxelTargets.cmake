@@ -10,6 +10,8 @@ endif()
 
 option(FREEVOXEL_WERROR "Treat warnings as errors" ON)
 option(FREEVOXEL_SANITIZE "Build with the address and undefined behaviour sanitizers" OFF)
+option(FREEVOXEL_JOIN_SOURCES "Compile the program's and the tests' files several at a time: most of their time is headers"
+       ON)
 
 find_package(PkgConfig REQUIRED)
 find_package(OpenMP REQUIRED COMPONENTS CXX)
@@ -49,11 +51,12 @@ function(freevoxel_library name)
   target_link_libraries(freevoxel_${name} PUBLIC freevoxel_settings ${arg_LINKS})
 endfunction()
 
-# freevoxel_test(NAME SOURCES ... LINKS ... [LABELS label]): a GoogleTest program; every case of it is a CTest test.
+# freevoxel_test(NAME SOURCES ... LINKS ... [LABELS label] [SEPARATE]): a GoogleTest program; every case of it is a CTest test.
 # Tests labelled "quick" also run under the sanitizers, those labelled "full" only in scripts/test_full.sh. (One label:
-# gtest_discover_tests would take a second one, or an empty one, for the next property.)
+# gtest_discover_tests would take a second one, or an empty one, for the next property.) SEPARATE: files are compiled one
+# by one, since several define the same names.
 function(freevoxel_test name)
-  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "SEPARATE" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 120)
   endif()
@@ -61,6 +64,12 @@ function(freevoxel_test name)
     set(labels LABELS ${arg_LABELS})
   endif()
   add_executable(${name} ${arg_SOURCES})
+  if(NOT arg_SEPARATE)
+    set_target_properties(${name} PROPERTIES UNITY_BUILD ${FREEVOXEL_JOIN_SOURCES} UNITY_BUILD_BATCH_SIZE 5)
+  endif()
+  # Tests wait for what they test, not for themselves. A fixture may live in an unnamed namespace (gcc only warns of it
+  # where files are joined).
+  target_compile_options(${name} PRIVATE -O1 $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   target_link_libraries(${name} PRIVATE ${arg_LINKS} freevoxel_test_support)
   gtest_discover_tests(${name}
     DISCOVERY_TIMEOUT 60

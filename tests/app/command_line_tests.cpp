@@ -10,7 +10,6 @@
 namespace freevoxel::test {
 namespace {
 
-constexpr int kFailed = 1, kUsage = 2;
 const std::vector<std::string> kCommands = {"generate", "precompute", "transfer", "info",
                                             "verify",   "render",     "compare",  "sheet"};
 

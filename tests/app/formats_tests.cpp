@@ -9,8 +9,6 @@
 namespace freevoxel::test {
 namespace {
 
-constexpr int kFailed = 1, kUsage = 2;
-
 /// A raw file of 5 x 7 x 11 bytes: label 3 on the left, label 9 on the right, and 0.
 void writeLabels(const std::string& path) {
   std::string bytes;

@@ -9,6 +9,9 @@
 
 namespace freevoxel::test {
 
+/// Exit statuses: the input or the machine would not do; the command line was wrong.
+constexpr int kFailed = 1, kUsage = 2;
+
 std::string programPath();
 
 /// Runs `freevoxel ARGUMENTS...` in `folder`.

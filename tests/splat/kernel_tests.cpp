@@ -13,8 +13,6 @@ namespace {
 
 using namespace test;
 
-const SplatOptions kKernel = {.footprint = Footprint::kernel};
-
 double kernelAt(double distance) {
   const double v = distance * distance / (double(shared::kKernelRadius) * double(shared::kKernelRadius));
   return double(shared::kernelProfile(float(v)));

@@ -11,8 +11,6 @@ namespace {
 
 using namespace test;
 
-const SplatOptions kKernel = {.footprint = Footprint::kernel};
-
 /// Centre of mass of S_o, in pixels.
 glm::dvec2 centreOfLight(const Image& sums) {
   glm::dvec2 centre(0.0);

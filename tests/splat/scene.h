@@ -16,6 +16,9 @@
 
 namespace freevoxel::test {
 
+/// The paper's footprint.
+const SplatOptions kKernel = {.footprint = Footprint::kernel};
+
 /// A volume, what it looks like, and the file precomputed from both.
 struct Scene {
   Volume volume;
