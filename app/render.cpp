@@ -19,7 +19,7 @@ namespace freevoxel {
 
 namespace {
 
-enum class PictureFormula { paper, direct, normalised, raycast };
+enum class PictureFormula { paper, direct, normalised, blended, raycast };
 
 struct Background {
   bool transparent = false;
@@ -33,6 +33,7 @@ struct RenderOptions {
   LightOptions light;
   PictureFormula formula = PictureFormula::normalised;
   SplatOptions splat;
+  BlendKernel blendKernel = BlendKernel::normalised;
   Backend backend = Backend::automatic;
   RaycastOptions raycast;
   std::optional<Background> background;
@@ -46,10 +47,11 @@ Formula splatFormula(PictureFormula formula) {
       return Formula::direct;
     case PictureFormula::normalised:
       return Formula::normalised;
+    case PictureFormula::blended:
     case PictureFormula::raycast:
       break;
   }
-  throw InternalError("internal error: ray casting has no sums");
+  throw InternalError("internal error: this formula has no sums");
 }
 
 Background parseBackground(std::string_view text) {
@@ -71,17 +73,23 @@ double parseStep(std::string_view text) {
   return step;
 }
 
+bool hasSums(PictureFormula formula) {
+  return formula != PictureFormula::raycast && formula != PictureFormula::blended;
+}
+
 /// Throws UsageError if options were given that would do nothing.
 void checkOptions(const RenderOptions& options, const CLI::App& command) {
   const auto given = [&](const char* name) { return command.get_option(name)->count() > 0; };
-  const bool raycast = options.formula == PictureFormula::raycast;
-  for (const char* name : {"--order", "--backend", "--sums", "--footprint", "--attenuation", "--light",
-                           "--light-direction", "--ambient", "--shading"}) {
-    if (raycast && given(name)) throw UsageError(fmt::format("{} does nothing with --formula raycast", name));
-  }
-  for (const char* name : {"--raycast", "--step"}) {
-    if (!raycast && given(name)) throw UsageError(fmt::format("{} needs --formula raycast", name));
-  }
+  const auto onlyWith = [&](bool allowed, std::initializer_list<const char*> names, const char* formulas) {
+    for (const char* name : names) {
+      if (!allowed && given(name)) throw UsageError(fmt::format("{} needs --formula {}", name, formulas));
+    }
+  };
+  onlyWith(hasSums(options.formula),
+           {"--order", "--backend", "--sums", "--footprint", "--attenuation", "--cull"}, "normalised, direct or paper");
+  onlyWith(options.formula != PictureFormula::raycast, {"--light-attenuation"}, "normalised, direct, paper or blended");
+  onlyWith(options.formula == PictureFormula::raycast, {"--raycast", "--step", "--shadow-step"}, "raycast");
+  onlyWith(options.formula == PictureFormula::blended, {"--blend-kernel"}, "blended");
   const std::string extension = lowerCaseExtension(options.output);
   if (extension != "png" && extension != "exr") {
     throw UsageError(fmt::format("--output: expected a name ending in .png or .exr, found '{}'", options.output));
@@ -121,6 +129,31 @@ TransferFunction transferFor(const AttenuationFile& file, const std::string& pat
   return transfer;
 }
 
+void report(const SplatStatistics& statistics, const ValueGrid& grid, const AttenuationFile* file, Session& session) {
+  session.addSeconds("attenuation", statistics.attenuationSeconds);
+  session.addSeconds("light", statistics.lightSeconds);
+  session.addSeconds("setup", statistics.setupSeconds);
+  session.addSeconds("draw", statistics.drawSeconds);
+  session.statistics["backend"] = statistics.backend;
+  if (!statistics.glRenderer.empty()) session.statistics["glRenderer"] = statistics.glRenderer;
+  if (!statistics.attenuation.empty()) session.statistics["attenuation"] = statistics.attenuation;
+  if (!statistics.lightAttenuation.empty()) session.statistics["lightAttenuation"] = statistics.lightAttenuation;
+  session.statistics["voxels"] = voxelCount(grid.dims);
+  if (file != nullptr) {
+    session.statistics["storedVoxels"] = file->storedVoxels();
+    session.statistics["fileBytes"] = file->fileBytes();
+    session.statistics["bytesPerVoxel"] = double(file->fileBytes()) / double(voxelCount(grid.dims));
+    session.statistics["nonFinite"] = file->nonFinite();
+  }
+  session.statistics["splats"] = statistics.splats;
+  session.statistics["culledSplats"] = statistics.culledSplats;
+  session.statistics["hiddenSplats"] = statistics.hiddenSplats;
+  session.statistics["fragments"] = statistics.fragments;
+  session.statistics["blocks"] = statistics.blocks;
+  session.statistics["culledBlocks"] = statistics.culledBlocks;
+  session.statistics["hiddenBlocks"] = statistics.hiddenBlocks;
+}
+
 Image drawRays(const ValueGrid& grid, const TransferFunction& transfer, const RenderOptions& options,
                Session& session) {
   const Camera camera = makeCamera(options.camera, worldBounds(grid.placement, grid.dims));
@@ -132,26 +165,13 @@ Image drawSplats(const ValueGrid& grid, const AttenuationFile* file, const Trans
                  const RenderOptions& options, Session& session) {
   const Camera camera = makeCamera(options.camera, worldBounds(grid.placement, grid.dims));
   Splatter splatter = session.timed("open", [&] { return Splatter(grid, file, transfer, options.backend); });
-  const SplatResult result = splatter.render(camera, options.splat, session.progress());
-  session.addSeconds("attenuation", result.statistics.attenuationSeconds);
-  session.addSeconds("light", result.statistics.lightSeconds);
-  session.addSeconds("setup", result.statistics.setupSeconds);
-  session.addSeconds("draw", result.statistics.drawSeconds);
-  session.statistics["backend"] = result.statistics.backend;
-  if (!result.statistics.glRenderer.empty()) session.statistics["glRenderer"] = result.statistics.glRenderer;
-  session.statistics["attenuation"] = result.statistics.attenuation;
-  session.statistics["voxels"] = voxelCount(grid.dims);
-  if (file != nullptr) {
-    session.statistics["storedVoxels"] = file->storedVoxels();
-    session.statistics["fileBytes"] = file->fileBytes();
-    session.statistics["bytesPerVoxel"] = double(file->fileBytes()) / double(voxelCount(grid.dims));
-    session.statistics["nonFinite"] = file->nonFinite();
+  if (options.formula == PictureFormula::blended) {
+    BlendedResult result = splatter.renderBlended(camera, options.blendKernel, options.splat, session.progress());
+    report(result.statistics, grid, file, session);
+    return std::move(result.image);
   }
-  session.statistics["splats"] = result.statistics.splats;
-  session.statistics["culledSplats"] = result.statistics.culledSplats;
-  session.statistics["fragments"] = result.statistics.fragments;
-  session.statistics["blocks"] = result.statistics.blocks;
-  session.statistics["culledBlocks"] = result.statistics.culledBlocks;
+  const SplatResult result = splatter.render(camera, options.splat, session.progress());
+  report(result.statistics, grid, file, session);
   session.statistics["passes"] = result.statistics.passes;
   session.statistics["quantum"] = result.sums.quantum;
   if (!options.sums.empty()) {
@@ -173,7 +193,12 @@ Image drawFile(RenderOptions options, const CLI::App& command, Session& session)
 
 /// Whether a picture takes the 26 stored directions.
 bool needsFile(const RenderOptions& options) {
-  return options.formula == PictureFormula::paper || options.splat.attenuation == AttenuationSource::stored;
+  const auto stored = [](AttenuationSource source) {
+    return source != AttenuationSource::automatic && source != AttenuationSource::swept;
+  };
+  return options.formula == PictureFormula::paper ||
+         (options.formula != PictureFormula::blended && stored(options.splat.attenuation)) ||
+         (!options.splat.lighting.lights.empty() && stored(options.splat.lightAttenuation));
 }
 
 Image drawVolume(RenderOptions options, const CLI::App& command, Session& session) {
@@ -223,8 +248,8 @@ void writePicture(const RenderOptions& options, Image picture, Session& session)
 
 Outcome render(RenderOptions options, const CLI::App& command, Session& session) {
   checkOptions(options, command);
-  if (options.formula != PictureFormula::raycast) options.splat.formula = splatFormula(options.formula);
-  options.splat.lighting = makeLighting(options.light);
+  if (hasSums(options.formula)) options.splat.formula = splatFormula(options.formula);
+  options.splat.lighting = options.raycast.lighting = makeLighting(options.light);
   if (options.formula == PictureFormula::paper && command.get_option("--footprint")->count() == 0) {
     options.splat.footprint = Footprint::kernel;
   }
@@ -254,9 +279,14 @@ Command addRender(CLI::App& program, CommonOptions& common) {
                             {{"normalised", PictureFormula::normalised},
                              {"direct", PictureFormula::direct},
                              {"paper", PictureFormula::paper},
+                             {"blended", PictureFormula::blended},
                              {"raycast", PictureFormula::raycast}},
                             "how the picture is made: order-free splats with exact opacity, plain sums, the paper to "
-                            "the letter, or the ray-cast reference");
+                            "the letter, kernels blended back to front (which leaks), or the ray-cast reference");
+  addChoice<BlendKernel>(*command, "--blend-kernel", options->blendKernel,
+                         {{"normalised", BlendKernel::normalised}, {"gaussian", BlendKernel::gaussian}},
+                         "of blended: the kernel of the other formulas, or a Gaussian of peak 1 as hardware splatters "
+                         "had it");
   addChoice<RaycastClassification>(*command, "--raycast", options->raycast.classification,
                                    {{"post", RaycastClassification::post},
                                     {"pre", RaycastClassification::pre},
@@ -266,17 +296,30 @@ Command addRender(CLI::App& program, CommonOptions& common) {
       *command, "--step", options->raycast.step, "EDGES",
       fmt::format("of raycast: step in shortest voxel edges, 0.001 to 1000 (default {})", options->raycast.step),
       parseStep);
+  addParsed<double>(*command, "--shadow-step", options->raycast.shadowStep, "EDGES",
+                    fmt::format("of raycast: the same along rays towards lamps (default {})",
+                                options->raycast.shadowStep),
+                    parseStep);
   addChoice<Footprint>(*command, "--footprint", options->splat.footprint,
                        {{"cell", Footprint::cell}, {"kernel", Footprint::kernel}},
                        "what a splat covers: cells between voxels, or the paper's kernels round voxels (default for "
                        "formula paper)");
-  addChoice<AttenuationSource>(*command, "--attenuation", options->splat.attenuation,
-                               {{"auto", AttenuationSource::automatic},
-                                {"stored", AttenuationSource::stored},
-                                {"swept", AttenuationSource::swept}},
-                               "what light loses on its way to the eye: from the file's 26 directions, or swept for "
-                               "this eye; auto takes the file "
-                               "unless the eye is inside the volume");
+  const std::vector<std::pair<std::string, AttenuationSource>> sources = {
+      {"auto", AttenuationSource::automatic},
+      {"stored", AttenuationSource::stored},
+      {"corrected", AttenuationSource::corrected},
+      {"swept", AttenuationSource::swept},
+      {"quotient", AttenuationSource::quotient}};
+  addChoice<AttenuationSource>(*command, "--attenuation", options->splat.attenuation, sources,
+                               "what light loses on its way to the eye: from the file's 26 directions, from these "
+                               "corrected by a coarse sweep, swept for this eye, or from the 26 with the paper's "
+                               "quotient for an eye inside the volume; auto takes corrected with an attenuation file "
+                               "and the eye outside, else swept");
+  addChoice<AttenuationSource>(*command, "--light-attenuation", options->splat.lightAttenuation, sources,
+                               "the same for light on its way from the lamps; auto takes stored with an attenuation "
+                               "file and the lamp outside, else swept");
+  addChoice<Cull>(*command, "--cull", options->splat.cull, {{"none", Cull::none}, {"hidden", Cull::hidden}},
+                  "leave out what hardly any light reaches the eye from");
   addChoice<Backend>(*command, "--backend", options->backend,
                      {{"auto", Backend::automatic}, {"gl", Backend::gl}, {"cpu", Backend::cpu}},
                      "what draws splats; the bits are the same");

@@ -6,19 +6,32 @@
 
 namespace freevoxel {
 
-float shade(Shading shading, glm::vec3 gradient, glm::vec3 towardsLight, glm::vec3 towardsEye) {
+namespace {
+
+/// cosine^kPhongExponent is below 2^-24 from here down.
+constexpr float kNoHighlight = 0.5f;
+
+}  // namespace
+
+Surface surfaceFacing(glm::vec3 gradient, glm::vec3 towardsEye) {
   const float steepness = glm::length(gradient);
-  if (shading == Shading::none || steepness == 0.0f) return 1.0f;
-  glm::vec3 normal = gradient / steepness;
-  if (glm::dot(normal, towardsEye) < 0.0f) normal = -normal;
-  const float cosine = std::max(0.0f, glm::dot(normal, towardsLight));
+  Surface surface;
+  if (!(steepness > 0.0f)) return surface;
+  surface.normal = gradient / steepness;
+  if (glm::dot(surface.normal, towardsEye) < 0.0f) surface.normal = -surface.normal;
+  surface.share = std::min(1.0f, steepness / kSurfaceGradient);
+  return surface;
+}
+
+float shade(Shading shading, const Surface& surface, glm::vec3 towardsLight, glm::vec3 towardsEye) {
+  if (shading == Shading::none || surface.share == 0.0f) return 1.0f;
+  const float cosine = std::max(0.0f, glm::dot(surface.normal, towardsLight));
   float shaded = cosine;
   if (shading == Shading::phong && cosine > 0.0f) {
-    const glm::vec3 mirrored = 2.0f * cosine * normal - towardsLight;
-    shaded += kPhongHighlight * std::pow(std::max(0.0f, glm::dot(mirrored, towardsEye)), kPhongExponent);
+    const float mirrored = glm::dot(2.0f * cosine * surface.normal - towardsLight, towardsEye);
+    if (mirrored > kNoHighlight) shaded += kPhongHighlight * std::pow(mirrored, kPhongExponent);
   }
-  const float surface = std::min(1.0f, steepness / kSurfaceGradient);
-  return 1.0f + surface * (shaded - 1.0f);
+  return 1.0f + surface.share * (shaded - 1.0f);
 }
 
 float largestShade(Shading shading) {

@@ -36,9 +36,18 @@ inline constexpr float kPhongExponent = 24.0f;
 /// change there is no surface to shade, and light scatters the same way in all directions.
 inline constexpr float kSurfaceGradient = 0.02f;
 
-/// How much of a lamp's light a voxel or sample sends to the eye. `gradient`: change of value per shortest voxel edge
-/// as a share of the value range, world axes; `towardsLight`, `towardsEye`: unit vectors, world.
-float shade(Shading shading, glm::vec3 gradient, glm::vec3 towardsLight, glm::vec3 towardsEye);
+/// What shading knows of a place in the volume, whatever the lamp.
+struct Surface {
+  glm::vec3 normal{0.0f};  ///< unit vector, world, on the side that faces the eye; 0 where there is no surface
+  float share = 0.0f;      ///< how much of a surface it is, 0..1
+};
+
+/// `gradient`: change of value per shortest voxel edge as a share of the value range, world axes; `towardsEye`: unit
+/// vector, world.
+Surface surfaceFacing(glm::vec3 gradient, glm::vec3 towardsEye);
+
+/// How much of a lamp's light a place sends to the eye. `towardsLight`, `towardsEye`: unit vectors, world.
+float shade(Shading shading, const Surface& surface, glm::vec3 towardsLight, glm::vec3 towardsEye);
 
 /// Largest value of `shade`.
 float largestShade(Shading shading);

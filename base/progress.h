@@ -17,4 +17,10 @@ class Progress {
   virtual void end() {}
 };
 
+/// Tells nobody.
+inline Progress& silentProgress() {
+  static Progress progress;
+  return progress;
+}
+
 }  // namespace freevoxel

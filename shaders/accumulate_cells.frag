@@ -14,6 +14,7 @@ layout(std430, binding = 5) readonly buffer Density { vec4 density[]; };
 layout(location = 1) uniform int imageWidth;
 layout(location = 2) uniform float entriesPerCode;
 layout(location = 3) uniform float inverseQuantum;
+layout(location = 4) uniform float hiddenBelow;
 
 flat in int block;
 
@@ -57,7 +58,7 @@ void main() {
   depthSums = vec2(0.0);
   if (!(ray.sLow < ray.sHigh)) return;
   CellLayout layout_ = layouts[block * 3 + int(ray.axisAndSide & kRayAxisMask)];
-  RaySums sums = traceBlock(layout_.samples, ray, layout_);
+  RaySums sums = traceBlock(layout_.samples, ray, layout_, hiddenBelow);
   precise float red = sums.red * inverseQuantum;
   precise float green = sums.green * inverseQuantum;
   precise float blue = sums.blue * inverseQuantum;

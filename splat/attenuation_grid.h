@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "base/placement.h"
-#include "hierarchy/attenuation_file.h"
 #include "splat/classification_table.h"
 #include "splat/value_grid.h"
+#include "volume/transfer_function.h"
 
 namespace freevoxel {
 
@@ -24,6 +24,8 @@ struct Towards {
 
   /// From a voxel to the target, in index units; not of unit length.
   glm::dvec3 from(glm::dvec3 voxel) const { return directional ? index : index - voxel; }
+  /// Whether the target is a point in the box of a volume, which reaches half a voxel beyond its samples.
+  bool inside(glm::ivec3 dims) const;
 };
 
 /// Attenuation as 0..65535, x fastest.
@@ -31,15 +33,6 @@ struct AttenuationGrid {
   static constexpr float kUnit = 65535.0f;
   std::vector<uint16_t> values;
 };
-
-/// How the 26 stored directions answer for one in between.
-enum class StoredLookup {
-  interpolated,  ///< face, edge and corner direction of its octant triangle (DESIGN section 3, look-up of A)
-  nearest,       ///< the one nearest by angle, as the paper has it
-};
-
-/// From the 26 stored directions; 1 where the file stored nothing.
-AttenuationGrid storedAttenuation(const AttenuationFile& file, const Towards& towards, StoredLookup lookup);
 
 /// Cubes of 8 voxels an edge in which, or within a cell of which, something is visible; x fastest.
 struct VisibleCubes {

@@ -26,11 +26,13 @@ struct CellFrame {
   const std::vector<PixelRay>* rays = nullptr;
   int edge = 16;  ///< of blocks, voxels
   float inverseQuantum = 0x1p20f;
+  float hiddenBelow = 0.0f;  ///< rays end where attenuation falls below this
 };
 
 struct CellCounts {
   uint64_t blocks = 0, culledBlocks = 0;
   uint64_t fragments = 0;  ///< pixels that the blocks' bounding rectangles cover
+  uint64_t pieces = 0;     ///< of rays between two planes of voxels, traced; not counted by gl
 };
 
 /// Adds blocks to sums that start at zero. Each block gives each pixel one contribution, rounded to whole quanta, so

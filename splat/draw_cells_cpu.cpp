@@ -109,7 +109,8 @@ class CpuCellCanvas final : public CellCanvas {
       if (!prepared.bounds.empty()) counts.fragments += uint64_t(size.x) * uint64_t(size.y);
     }
     const glm::ivec2 tiles = (image_.size + (kTile - 1)) / kTile;
-#pragma omp parallel for schedule(dynamic, 1)
+    uint64_t pieces = 0;
+#pragma omp parallel for schedule(dynamic, 1) reduction(+ : pieces)
     for (int tile = 0; tile < tiles.x * tiles.y; ++tile) {
       const glm::ivec2 low = glm::ivec2(tile % tiles.x, tile / tiles.x) * kTile;
       const glm::ivec2 high = glm::min(low + kTile, image_.size);
@@ -118,17 +119,20 @@ class CpuCellCanvas final : public CellCanvas {
         const glm::ivec2 from = glm::max(low, prepared.bounds.low), to = glm::min(high, prepared.bounds.high);
         for (int y = from.y; y < to.y; ++y) {
           for (int x = from.x; x < to.x; ++x)
-            drawPixel(frame, prepared, x, y);
+            pieces += drawPixel(frame, prepared, x, y);
         }
       }
     }
+    counts.pieces += pieces;
   }
 
-  void drawPixel(const CellFrame& frame, const Prepared& prepared, int x, int y) {
+  /// Gives the number of pieces traced.
+  uint64_t drawPixel(const CellFrame& frame, const Prepared& prepared, int x, int y) {
     const PixelRay& ray = (*frame.rays)[size_t(y) * size_t(image_.size.x) + size_t(x)];
-    if (!(ray.sLow < ray.sHigh)) return;
+    if (!(ray.sLow < ray.sHigh)) return 0;
     const shared::RaySums sums =
-        shared::traceBlock(prepared.reader, ray, prepared.layouts[ray.axisAndSide & shared::kRayAxisMask]);
+        shared::traceBlock(
+        prepared.reader, ray, prepared.layouts[ray.axisAndSide & shared::kRayAxisMask], frame.hiddenBelow);
     float* pixel = image_.at(x, y);
     pixel[0] += shared::roundToWhole(sums.red * frame.inverseQuantum);
     pixel[1] += shared::roundToWhole(sums.green * frame.inverseQuantum);
@@ -138,6 +142,7 @@ class CpuCellCanvas final : public CellCanvas {
     shared::splitDepth(sums.depth * shared::kDepth64FromLog2, high, low);
     pixel[4] += high;
     pixel[5] += low;
+    return uint64_t(sums.pieces);
   }
 
   Image image_;

@@ -15,7 +15,8 @@ namespace {
 constexpr size_t kVoxelsAtATime = size_t(4) << 20;
 
 // Locations and bindings of draw_blocks.vert and accumulate_cells.frag.
-constexpr GLint kImageSizeUniform = 0, kImageWidthUniform = 1, kEntriesPerCodeUniform = 2, kInverseQuantumUniform = 3;
+constexpr GLint kImageSizeUniform = 0, kImageWidthUniform = 1, kEntriesPerCodeUniform = 2, kInverseQuantumUniform = 3,
+                kHiddenBelowUniform = 4;
 constexpr GLuint kRaysBinding = 0, kLayoutsBinding = 1, kSamplesBinding = 2, kLightsBinding = 3, kIntegralBinding = 4,
                  kDensityBinding = 5;
 
@@ -43,6 +44,7 @@ class GlCellCanvas final : public CellCanvas {
     replace(density_, bytesOf(frame.table->density));
     glProgramUniform1f(program_.id(), kEntriesPerCodeUniform, frame.table->entriesPerCode);
     glProgramUniform1f(program_.id(), kInverseQuantumUniform, frame.inverseQuantum);
+    glProgramUniform1f(program_.id(), kHiddenBelowUniform, frame.hiddenBelow);
     const size_t blocksAtATime = std::max(size_t(1), kVoxelsAtATime / blockVoxels(frame.edge));
     while (!blocks.empty()) {
       const std::span<const VisibleBlock> batch = blocks.first(std::min(blocks.size(), blocksAtATime));

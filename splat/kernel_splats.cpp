@@ -30,8 +30,13 @@ struct Shape {
 
 }  // namespace
 
-KernelSetup::KernelSetup(const VolumeView& view, std::vector<Classified> classified, Formula formula, float quantum)
-    : view_(view), classified_(std::move(classified)), formula_(formula), inverseQuantum_(1.0f / quantum) {
+KernelSetup::KernelSetup(const VolumeView& view, std::vector<Classified> classified, KernelEmission emission,
+                         float quantum, float hiddenBelow)
+    : view_(view),
+      classified_(std::move(classified)),
+      emission_(emission),
+      inverseQuantum_(1.0f / quantum),
+      hiddenBelow_(hiddenBelow) {
   orthographicPower_ = lengthPerPlane(glm::dvec3(0.0, 0.0, 1.0));
   const glm::dmat3& edges = view_.viewFromIndex;
   for (const double x : {-1.0, 1.0}) {
@@ -49,8 +54,9 @@ float KernelSetup::lengthPerPlane(glm::dvec3 towards) const {
   return float(1.0 / std::max({omega.x, omega.y, omega.z}));
 }
 
-void KernelSetup::append(const ValueGrid& grid, const AttenuationGrid& attenuation, const LightGrid& light,
-                         glm::ivec3 origin, int edge, std::vector<KernelSplat>& splats, Counts& counts) const {
+template <class Keep>
+void KernelSetup::forEachSplat(const ValueGrid& grid, const AttenuationGrid* attenuation, const LightGrid& light,
+                               glm::ivec3 origin, int edge, Counts& counts, Keep&& keep) const {
   const glm::ivec3 last = glm::min(origin + edge, grid.dims);
   for (int z = origin.z; z < last.z; ++z) {
     for (int y = origin.y; y < last.y; ++y) {
@@ -58,9 +64,14 @@ void KernelSetup::append(const ValueGrid& grid, const AttenuationGrid& attenuati
       for (int x = origin.x; x < last.x; ++x, ++at) {
         const Classified& voxel = classified_[grid.codes[at]];
         if (voxel.extinction <= 0.0f) continue;
+        const float reaching =
+            attenuation == nullptr ? 1.0f : float(attenuation->values[at]) * (1.0f / AttenuationGrid::kUnit);
+        if (reaching < hiddenBelow_) {
+          ++counts.hiddenSplats;
+          continue;
+        }
         KernelSplat splat;
-        if (!makeSplat({x, y, z}, voxel, float(attenuation.values[at]) * (1.0f / AttenuationGrid::kUnit), splat,
-                       counts)) {
+        if (!makeSplat({x, y, z}, voxel, reaching, splat, counts)) {
           ++counts.culledSplats;
           continue;
         }
@@ -69,10 +80,24 @@ void KernelSetup::append(const ValueGrid& grid, const AttenuationGrid& attenuati
           splat.emissionG *= float(light.values[at].green) * (1.0f / LightGrid::kUnit);
           splat.emissionB *= float(light.values[at].blue) * (1.0f / LightGrid::kUnit);
         }
-        splats.push_back(splat);
+        keep(splat, glm::ivec3(x, y, z));
       }
     }
   }
+}
+
+void KernelSetup::append(const ValueGrid& grid, const AttenuationGrid& attenuation, const LightGrid& light,
+                         glm::ivec3 origin, int edge, std::vector<KernelSplat>& splats, Counts& counts) const {
+  forEachSplat(grid, &attenuation, light, origin, edge, counts,
+               [&](const KernelSplat& splat, glm::ivec3) { splats.push_back(splat); });
+}
+
+void KernelSetup::appendWithDistance(const ValueGrid& grid, const LightGrid& light, glm::ivec3 origin, int edge,
+                                     std::vector<BlendSplat>& splats, Counts& counts) const {
+  forEachSplat(grid, nullptr, light, origin, edge, counts, [&](const KernelSplat& splat, glm::ivec3 voxel) {
+    const glm::dvec3 position = view_.viewPosition(glm::dvec3(voxel));
+    splats.push_back({splat, float(view_.orthographic ? -position.z : glm::length(position))});
+  });
 }
 
 bool KernelSetup::makeSplat(glm::ivec3 index, const Classified& voxel, float attenuation, KernelSplat& splat,
@@ -137,15 +162,15 @@ bool KernelSetup::makeSplat(glm::ivec3 index, const Classified& voxel, float att
   const float length =
       float(view_.voxelVolume * pixelsPerEdge * pixelsPerEdge * distancePerDepth / std::sqrt(determinant));
   splat.depth64 = 64.0f * voxel.extinction * length;
-  float emission;
-  if (formula_ == Formula::paper) {
-    emission = -std::expm1(-voxel.extinction);
+  float light = attenuation * inverseQuantum_;
+  if (emission_ == KernelEmission::opacity) {
+    light *= -std::expm1(-voxel.extinction) * length;
   } else {
-    // E = (1 - T^l) / l: every plane of voxels emits exactly 1 - T^l, so that a slab telescopes.
+    // Every plane of voxels takes exactly 1 - T^l, so that a slab telescopes.
     const float power = view_.orthographic ? orthographicPower_ : lengthPerPlane(towardsEye);
-    emission = -std::expm1(-voxel.extinction * power) / power;
+    light *= -std::expm1(-voxel.extinction * power);
+    if (emission_ == KernelEmission::telescoping) light *= length / power;
   }
-  const float light = emission * attenuation * length * inverseQuantum_;
   splat.emissionR = voxel.linear.r * light;
   splat.emissionG = voxel.linear.g * light;
   splat.emissionB = voxel.linear.b * light;

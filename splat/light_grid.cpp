@@ -4,84 +4,168 @@
 #include <glm/glm.hpp>
 
 #include "base/error.h"
+#include "splat/gradient.h"
 
 namespace freevoxel {
 
-glm::vec3 gradientAt(const ValueGrid& grid, glm::ivec3 p) {
-  glm::dvec3 perIndex(0.0);
-  for (int axis = 0; axis < 3; ++axis) {
-    glm::ivec3 low = p, high = p;
-    low[axis] = std::max(0, p[axis] - 1);
-    high[axis] = std::min(grid.dims[axis] - 1, p[axis] + 1);
-    if (low[axis] == high[axis]) continue;
-    perIndex[axis] =
-        (double(grid.codes[linearIndex(high, grid.dims)]) - double(grid.codes[linearIndex(low, grid.dims)])) /
-        (high[axis] - low[axis]);
-  }
-  // A gradient is a covector: it goes with the transposed inverse of the axes.
-  const glm::dmat3 worldFromIndex(grid.placement.worldFromIndex());
-  const glm::dvec3 world = glm::transpose(glm::inverse(worldFromIndex)) * perIndex;
-  return glm::vec3(world * (grid.placement.unitLength() / grid.coding.largest));
-}
-
-LightGrid lightGrid(const ValueGrid& grid, const Lighting& lighting, const Camera& camera,
-                    const std::function<AttenuationGrid(const Light&)>& attenuation) {
-  LightGrid result;
-  if (lighting.unlit()) return result;
-  glm::vec3 largest(lighting.ambient);
+void checkLighting(const Lighting& lighting) {
   for (const Light& light : lighting.lights) {
     for (int channel = 0; channel < 3; ++channel) {
       if (!(light.linear[channel] >= 0.0f) || !std::isfinite(light.linear[channel])) {
         throw InputError("light: colours must be finite and not negative");
       }
     }
-    largest += light.linear * largestShade(lighting.shading);
+    if (light.directional && glm::length(light.world) == 0.0) throw InputError("light: a direction must not be 0,0,0");
   }
   if (!(lighting.ambient >= 0.0f) || !std::isfinite(lighting.ambient)) {
     throw InputError("light: ambient must be finite and not negative");
   }
+}
+
+namespace {
+
+/// Lights some voxels at a time.
+class Lamps {
+ public:
+  Lamps(const ValueGrid& grid, const Lighting& lighting, const Camera& camera,
+        std::span<const LampAttenuation> attenuations, LightGrid& result)
+      : grid_(grid),
+        lighting_(lighting),
+        camera_(camera),
+        attenuations_(attenuations),
+        result_(result),
+        worldFromIndex_(grid.placement.worldFromIndex()),
+        gradientFromIndex_(worldFromIndexGradient(grid)),
+        towardsOrthographicEye_(glm::normalize(camera.eye - camera.target)) {
+    for (const Light& light : lighting.lights)
+      directions_.push_back(light.directional ? glm::normalize(light.world) : glm::dvec3(0.0));
+  }
+
+  /// `brick`: the one whose curve `voxels` follow, or null. Voxels outside the volume are skipped.
+  void light(std::span<const glm::ivec3> voxels, const BrickView* brick) const {
+    std::vector<glm::vec3> sums(voxels.size(), glm::vec3(lighting_.ambient));
+    std::vector<Facing> facings;
+    if (lighting_.shading != Shading::none) {
+      facings.reserve(voxels.size());
+      for (const glm::ivec3& voxel : voxels)
+        facings.push_back(facing(voxel));
+    }
+    std::vector<float> passed(voxels.size());
+    for (size_t lamp = 0; lamp < lighting_.lights.size(); ++lamp) {
+      const LampAttenuation& attenuation = attenuations_[lamp];
+      if (attenuation.stored) {
+        attenuation.stored->look(*brick, passed);
+      } else {
+        for (size_t i = 0; i < voxels.size(); ++i) {
+          if (!outside(voxels[i]))
+            passed[i] = float(attenuation.grid.values[linearIndex(voxels[i], grid_.dims)]) *
+                        (1.0f / AttenuationGrid::kUnit);
+        }
+      }
+      const Light& light = lighting_.lights[lamp];
+      for (size_t i = 0; i < voxels.size(); ++i) {
+        const float share = facings.empty() ? 1.0f : shadeBy(lamp, facings[i]);
+        sums[i] += light.linear * (passed[i] * share);
+      }
+    }
+    const float perScale = 1.0f / result_.scale;
+    for (size_t i = 0; i < voxels.size(); ++i) {
+      if (outside(voxels[i])) continue;
+      const glm::vec3 value = glm::clamp(sums[i] * perScale, 0.0f, 1.0f) * LightGrid::kUnit + 0.5f;
+      result_.values[linearIndex(voxels[i], grid_.dims)] = {uint16_t(value.r), uint16_t(value.g), uint16_t(value.b), 0};
+    }
+  }
+
+ private:
+  /// A voxel as shading sees it.
+  struct Facing {
+    glm::dvec3 world;
+    glm::vec3 towardsEye;
+    Surface surface;
+  };
+
+  bool outside(glm::ivec3 voxel) const {
+    return voxel.x >= grid_.dims.x || voxel.y >= grid_.dims.y || voxel.z >= grid_.dims.z;
+  }
+
+  Facing facing(glm::ivec3 voxel) const {
+    Facing facing;
+    if (outside(voxel)) return facing;
+    facing.world = glm::dvec3(worldFromIndex_ * glm::dvec4(voxel, 1.0));
+    const glm::dvec3 toEye = camera_.orthographicHeight ? towardsOrthographicEye_ : camera_.eye - facing.world;
+    const double distance = glm::length(toEye);
+    if (!(distance > 0.0)) return facing;
+    facing.towardsEye = glm::vec3(toEye / distance);
+    facing.surface = surfaceFacing(gradientFromIndex_ * indexGradient(grid_, voxel), facing.towardsEye);
+    return facing;
+  }
+
+  float shadeBy(size_t lamp, const Facing& facing) const {
+    if (facing.surface.share == 0.0f) return 1.0f;
+    const Light& light = lighting_.lights[lamp];
+    glm::vec3 towardsLight(directions_[lamp]);
+    if (!light.directional) {
+      const glm::dvec3 toLight = light.world - facing.world;
+      const double distance = glm::length(toLight);
+      if (!(distance > 0.0)) return 1.0f;
+      towardsLight = glm::vec3(toLight / distance);
+    }
+    return shade(lighting_.shading, facing.surface, towardsLight, facing.towardsEye);
+  }
+
+  const ValueGrid& grid_;
+  const Lighting& lighting_;
+  const Camera& camera_;
+  std::span<const LampAttenuation> attenuations_;
+  LightGrid& result_;
+  glm::dmat4 worldFromIndex_;
+  glm::mat3 gradientFromIndex_;
+  glm::dvec3 towardsOrthographicEye_;
+  std::vector<glm::dvec3> directions_;  ///< unit vectors towards directional lamps
+};
+
+}  // namespace
+
+LightGrid lightGrid(const ValueGrid& grid, const VisibleCubes& cubes, const AttenuationFile* file,
+                    const Lighting& lighting, const Camera& camera, std::span<const LampAttenuation> attenuations) {
+  checkLighting(lighting);
+  checkEqual(attenuations.size(), lighting.lights.size(), "lamps and their attenuations");
+  LightGrid result;
+  if (lighting.unlit()) return result;
+  glm::vec3 largest(lighting.ambient);
+  for (const Light& light : lighting.lights)
+    largest += light.linear * largestShade(lighting.shading);
   result.scale = std::max({largest.x, largest.y, largest.z});
   result.values.resize(grid.codes.size());
   if (!(result.scale > 0.0f)) {
     result.scale = 1.0f;
     return result;
   }
-  const float perScale = 1.0f / result.scale;
-
-  std::vector<glm::vec3> sums(grid.codes.size(), glm::vec3(lighting.ambient));
-  const glm::dmat4 worldFromIndex = grid.placement.worldFromIndex();
-  const glm::dvec3 towardsOrthographicEye = glm::normalize(camera.eye - camera.target);
-  for (const Light& light : lighting.lights) {
-    if (light.directional && glm::length(light.world) == 0.0) throw InputError("light: a direction must not be 0,0,0");
-    const AttenuationGrid arriving = attenuation(light);
-    const glm::dvec3 direction = light.directional ? glm::normalize(light.world) : glm::dvec3(0.0);
-#pragma omp parallel for schedule(dynamic, 1)
-    for (int z = 0; z < grid.dims.z; ++z) {
-      for (int y = 0; y < grid.dims.y; ++y) {
-        for (int x = 0; x < grid.dims.x; ++x) {
-          const uint64_t at = linearIndex({x, y, z}, grid.dims);
-          const float passed = float(arriving.values[at]) * (1.0f / AttenuationGrid::kUnit);
-          if (passed == 0.0f) continue;
-          float share = 1.0f;
-          if (lighting.shading != Shading::none) {
-            const glm::dvec3 world(worldFromIndex * glm::dvec4(x, y, z, 1.0));
-            const glm::dvec3 toLight = light.directional ? direction : light.world - world;
-            const glm::dvec3 toEye = camera.orthographicHeight ? towardsOrthographicEye : camera.eye - world;
-            const double lightDistance = glm::length(toLight), eyeDistance = glm::length(toEye);
-            if (lightDistance > 0.0 && eyeDistance > 0.0) {
-              share = shade(lighting.shading, gradientAt(grid, {x, y, z}), glm::vec3(toLight / lightDistance),
-                            glm::vec3(toEye / eyeDistance));
-            }
-          }
-          sums[at] += light.linear * (passed * share);
-        }
-      }
+  const Lamps lamps(grid, lighting, camera, attenuations, result);
+  if (file != nullptr) {
+    const int64_t bricks = int64_t(file->brickCount());
+#pragma omp parallel for schedule(dynamic, 4)
+    for (int64_t b = 0; b < bricks; ++b) {
+      const BrickView brick = file->brick(size_t(b));
+      std::vector<glm::ivec3> voxels;
+      voxels.reserve(brick.curve.size());
+      for (const LocalPosition& local : brick.curve)
+        voxels.push_back(brick.origin + glm::ivec3(local.x, local.y, local.z));
+      lamps.light(voxels, &brick);
     }
+    return result;
   }
-#pragma omp parallel for schedule(static)
-  for (int64_t i = 0; i < int64_t(sums.size()); ++i) {
-    const glm::vec3 value = glm::clamp(sums[size_t(i)] * perScale, 0.0f, 1.0f) * LightGrid::kUnit + 0.5f;
-    result.values[size_t(i)] = {uint16_t(value.r), uint16_t(value.g), uint16_t(value.b), 0};
+  constexpr int kEdge = 1 << VisibleCubes::kShift;
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int64_t i = 0; i < int64_t(cubes.visible.size()); ++i) {
+    if (cubes.visible[size_t(i)] == 0) continue;
+    const glm::ivec3 cube(int(i % cubes.dims.x), int(i / cubes.dims.x % cubes.dims.y),
+                          int(i / (int64_t(cubes.dims.x) * cubes.dims.y)));
+    std::vector<glm::ivec3> voxels;
+    voxels.reserve(size_t(kEdge) * kEdge * kEdge);
+    for (int n = 0; n < kEdge * kEdge * kEdge; ++n)
+      voxels.push_back(cube * kEdge + glm::ivec3(n % kEdge, n / kEdge % kEdge, n / (kEdge * kEdge)));
+    lamps.light(voxels, nullptr);
   }
   return result;
 }

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
+#include <optional>
+#include <span>
 #include <vector>
 
 #include "base/camera.h"
 #include "base/light.h"
 #include "splat/attenuation_grid.h"
+#include "splat/stored_attenuation.h"
 #include "splat/value_grid.h"
 
 namespace freevoxel {
@@ -27,14 +29,19 @@ struct LightGrid {
   bool empty() const { return values.empty(); }
 };
 
-/// Change of value at voxel p per shortest voxel edge, as a share of the range of codes, in world axes: central
-/// differences, one-sided at the border.
-glm::vec3 gradientAt(const ValueGrid& grid, glm::ivec3 p);
+/// What the volume lets through towards one lamp: looked up in the attenuation file, or a whole grid.
+struct LampAttenuation {
+  std::optional<StoredAttenuation> stored;
+  AttenuationGrid grid;  ///< if not `stored`
+};
 
-/// Ambient light, and every lamp's times what the volume lets through to the voxel times its shading. `attenuation`
-/// gives the grid towards a lamp. Throws InputError for colours or directions that make no sense.
-/// Empty if the lighting is Lighting::unlit().
-LightGrid lightGrid(const ValueGrid& grid, const Lighting& lighting, const Camera& camera,
-                    const std::function<AttenuationGrid(const Light&)>& attenuation);
+/// Throws InputError for colours or directions that make no sense.
+void checkLighting(const Lighting& lighting);
+
+/// Ambient light, and every lamp's times what the volume lets through to the voxel times its shading, in one pass over
+/// the voxels that a visible cell touches (what other voxels get does not matter). `attenuations`: one per lamp. `file`
+/// may be null if none of them is `stored`. Empty if the lighting is Lighting::unlit().
+LightGrid lightGrid(const ValueGrid& grid, const VisibleCubes& cubes, const AttenuationFile* file,
+                    const Lighting& lighting, const Camera& camera, std::span<const LampAttenuation> attenuations);
 
 }  // namespace freevoxel

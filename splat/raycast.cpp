@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "base/error.h"
+#include "splat/gradient.h"
+#include "splat/light_grid.h"
 #include "splat/volume_view.h"
 
 namespace freevoxel {
@@ -14,6 +16,11 @@ namespace {
 
 /// Light below this share of what entered cannot change a picture's float.
 constexpr float kOpaque = 1e-7f;
+/// The same of a way's optical depth.
+constexpr double kOpaqueDepth = 16.2;
+/// A sample that adds less than this share of a ray's light takes the light of the last one that added more: no picture
+/// shows the difference, and shadow rays are all that costs time.
+constexpr float kFaint = 1e-4f;
 /// Voxels an edge of the cubes that are skipped where nothing in them is visible.
 constexpr int kSkipEdge = 8;
 /// Entries of the table of post-classification per step of the value's code.
@@ -37,7 +44,14 @@ Medium mix(const Medium& a, const Medium& b, float t) {
 class Caster {
  public:
   Caster(const ValueGrid& grid, const TransferFunction& transfer, const RaycastOptions& options)
-      : grid_(grid), options_(options) {
+      : grid_(grid),
+        options_(options),
+        worldFromIndex_(grid.placement.worldFromIndex()),
+        gradientFromIndex_(worldFromIndexGradient(grid)) {
+    for (const Light& light : options.lighting.lights) {
+      targets_.push_back(light.directional ? Towards::direction(grid.placement, light.world)
+                                           : Towards::point(grid.placement, light.world));
+    }
     const size_t codes = size_t(grid.coding.largest) + 1;
     ofCode_.resize(codes);
     for (size_t code = 0; code < codes; ++code)
@@ -52,25 +66,16 @@ class Caster {
 
   /// What a ray gathers, with positions in index space; `step` in shortest voxel edges.
   glm::vec4 trace(glm::dvec3 origin, glm::dvec3 direction) const {
-    double enter = 0.0, leave = INFINITY;
-    const double beyond = options_.classification == RaycastClassification::pre ? 1.0 : 0.5;
-    for (int axis = 0; axis < 3; ++axis) {
-      const double lower = -beyond - origin[axis];
-      const double upper = grid_.dims[axis] - 1 + beyond - origin[axis];
-      if (direction[axis] == 0.0) {
-        if (lower > 0.0 || upper < 0.0) return glm::vec4(0.0f);
-        continue;
-      }
-      const double t0 = lower / direction[axis], t1 = upper / direction[axis];
-      enter = std::max(enter, std::min(t0, t1));
-      leave = std::min(leave, std::max(t0, t1));
-    }
+    const auto [enter, leave] = clip(origin, direction);
     if (!(enter < leave)) return glm::vec4(0.0f);
     // Equal steps that fill the ray's way through the box exactly, none longer than asked for.
     const double wanted = std::ceil((leave - enter) / options_.step);
     const int64_t steps = int64_t(std::max(1.0, wanted));
     const double length = (leave - enter) / double(steps);
-    glm::vec3 light(0.0f);
+    const bool lit = !options_.lighting.unlit();
+    const glm::vec3 towardsEye = glm::normalize(glm::vec3(worldFromIndex_ * glm::dvec4(-direction, 0.0)));
+    glm::vec3 light(0.0f), arriving(1.0f);
+    bool arrivingKnown = !lit;
     float through = 1.0f;
     for (int64_t i = 0; i < steps;) {
       const double t = enter + (double(i) + 0.5) * length;
@@ -83,7 +88,12 @@ class Caster {
       const Medium m = sample(p);
       if (m.extinction > 0.0f) {
         const float passed = std::exp(-m.extinction * float(length));
-        light += through * (1.0f - passed) / m.extinction * m.emission;
+        const float emitted = through * (1.0f - passed);
+        if (lit && (!arrivingKnown || emitted > kFaint)) {
+          arriving = lightAt(p, towardsEye);
+          arrivingKnown = true;
+        }
+        light += emitted / m.extinction * m.emission * arriving;
         through *= passed;
         if (through < kOpaque) break;
       }
@@ -92,7 +102,82 @@ class Caster {
     return glm::vec4(light, 1.0f - through);
   }
 
+  /// Share of light that gets from p to a target.
+  float transmittance(glm::dvec3 p, const Towards& target, double step) const {
+    const glm::dvec3 u = target.from(p);
+    const double distance = glm::length(target.lengthFromIndex * u);
+    if (!(distance > 0.0)) return 1.0f;
+    const glm::dvec3 direction = u / distance;
+    const double leave = std::min(clip(p, direction).second, target.directional ? double(INFINITY) : distance);
+    if (!(leave > 0.0)) return 1.0f;
+    const int64_t steps = std::max(int64_t(1), int64_t(std::ceil(leave / step)));
+    const double length = leave / double(steps);
+    double depth = 0.0;
+    for (int64_t i = 0; i < steps;) {
+      const glm::dvec3 at = p + (double(i) + 0.5) * length * direction;
+      const int64_t skip = stepsToSkip(at, direction, length);
+      if (skip > 0) {
+        i += skip;
+        continue;
+      }
+      depth += double(sample(at).extinction) * length;
+      if (depth > kOpaqueDepth) return 0.0f;
+      ++i;
+    }
+    return float(std::exp(-depth));
+  }
+
  private:
+  /// Where a ray enters and leaves the box, from its origin on.
+  std::pair<double, double> clip(glm::dvec3 origin, glm::dvec3 direction) const {
+    double enter = 0.0, leave = INFINITY;
+    const double beyond = options_.classification == RaycastClassification::pre ? 1.0 : 0.5;
+    for (int axis = 0; axis < 3; ++axis) {
+      const double lower = -beyond - origin[axis];
+      const double upper = grid_.dims[axis] - 1 + beyond - origin[axis];
+      if (direction[axis] == 0.0) {
+        if (lower > 0.0 || upper < 0.0) return {0.0, 0.0};
+        continue;
+      }
+      const double t0 = lower / direction[axis], t1 = upper / direction[axis];
+      enter = std::max(enter, std::min(t0, t1));
+      leave = std::min(leave, std::max(t0, t1));
+    }
+    return {enter, leave};
+  }
+
+  /// Light that arrives at p and leaves for the eye.
+  glm::vec3 lightAt(glm::dvec3 p, glm::vec3 towardsEye) const {
+    const Lighting& lighting = options_.lighting;
+    Surface surface;
+    if (lighting.shading != Shading::none && options_.classification != RaycastClassification::nearest)
+      surface = surfaceFacing(gradientFromIndex_ * gradientAt(p), towardsEye);
+    glm::vec3 sum(lighting.ambient);
+    for (size_t lamp = 0; lamp < targets_.size(); ++lamp) {
+      const glm::dvec3 toLight = targets_[lamp].lengthFromIndex * targets_[lamp].from(p);
+      const double distance = glm::length(toLight);
+      const float share =
+          distance > 0.0 ? shade(lighting.shading, surface, glm::vec3(toLight / distance), towardsEye) : 1.0f;
+      if (share > 0.0f)
+        sum += lighting.lights[lamp].linear * (share * transmittance(p, targets_[lamp], options_.shadowStep));
+    }
+    return sum;
+  }
+
+  /// Index gradient between voxels, interpolated.
+  glm::vec3 gradientAt(glm::dvec3 p) const {
+    const glm::dvec3 inside = glm::clamp(p, glm::dvec3(0.0), glm::dvec3(grid_.dims - 1));
+    const glm::ivec3 low(inside), high = glm::min(low + 1, grid_.dims - 1);
+    const glm::vec3 t(inside - glm::dvec3(low));
+    glm::vec3 sum(0.0f);
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::bvec3 up(corner & 1, corner & 2, corner & 4);
+      const float weight = (up.x ? t.x : 1.0f - t.x) * (up.y ? t.y : 1.0f - t.y) * (up.z ? t.z : 1.0f - t.z);
+      if (weight > 0.0f) sum += weight * indexGradient(grid_, glm::mix(low, high, up));
+    }
+    return sum;
+  }
+
   void findVisibleCubes(const TransferFunction& transfer) {
     // visibleUpTo[c]: how many of the unit intervals of codes below c hold something visible.
     const ValueCoding& coding = grid_.coding;
@@ -196,6 +281,9 @@ class Caster {
 
   const ValueGrid& grid_;
   RaycastOptions options_;
+  glm::dmat4 worldFromIndex_;
+  glm::mat3 gradientFromIndex_;
+  std::vector<Towards> targets_;  ///< the lamps
   std::vector<Medium> ofCode_;
   std::vector<Medium> table_;  ///< over the range of codes, linear in between
   double tablePerCode_ = 1.0;
@@ -210,6 +298,10 @@ Image raycast(const ValueGrid& grid, const TransferFunction& transfer, const Cam
   if (!(options.step > 0.0) || !std::isfinite(options.step)) {
     throw InputError(fmt::format("raycast: step {} is not a positive length", options.step));
   }
+  if (!(options.shadowStep > 0.0) || !std::isfinite(options.shadowStep)) {
+    throw InputError(fmt::format("raycast: shadow step {} is not a positive length", options.shadowStep));
+  }
+  checkLighting(options.lighting);
   checkEqual(uint64_t(grid.codes.size()), voxelCount(grid.dims), "codes of the grid");
   const ViewFrame frame = viewFrame(camera);
   const Caster caster(grid, transfer, options);
@@ -232,6 +324,19 @@ Image raycast(const ValueGrid& grid, const TransferFunction& transfer, const Cam
   }
   progress.end();
   return picture;
+}
+
+std::vector<float> marchTransmittance(const ValueGrid& grid, const TransferFunction& transfer,
+                                      std::span<const glm::dvec3> positions, const Towards& target, double step) {
+  if (!(step > 0.0) || !std::isfinite(step)) {
+    throw InputError(fmt::format("raycast: step {} is not a positive length", step));
+  }
+  const Caster caster(grid, transfer, {});
+  std::vector<float> result(positions.size());
+#pragma omp parallel for schedule(dynamic, 64)
+  for (int64_t i = 0; i < int64_t(positions.size()); ++i)
+    result[size_t(i)] = caster.transmittance(positions[size_t(i)], target, step);
+  return result;
 }
 
 }  // namespace freevoxel

@@ -5,12 +5,15 @@
 #include <glm/common.hpp>
 #include <glm/matrix.hpp>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
 #include "base/error.h"
 #include "shaders/shared/quantum.h"
 #include "splat/attenuation_grid.h"
+#include "splat/blend_kernels.h"
+#include "splat/coarse_volume.h"
 #include "splat/draw_cells.h"
 #include "splat/draw_kernels.h"
 #include "splat/kernel_splats.h"
@@ -64,9 +67,22 @@ std::vector<Classified> classifyCodes(const ValueCoding& coding, const TransferF
   return classified;
 }
 
-bool inside(const ValueGrid& grid, const Towards& target) {
-  return !target.directional && glm::all(glm::greaterThan(target.index, glm::dvec3(-0.5))) &&
-         glm::all(glm::lessThan(target.index, glm::dvec3(grid.dims) - 0.5));
+/// A ray ends where less of its light than this would reach the eye. What stored attenuation says of a ray in between
+/// its directions is too rough to end it; there only whole blocks are left out.
+constexpr float kHiddenBelow = 0x1p-12f;
+
+/// Whether no voxel that the block's rays may touch has attenuation of `threshold` (of AttenuationGrid::kUnit) or more.
+bool isHidden(const VisibleBlock& block, glm::ivec3 dims, const AttenuationGrid& attenuation, uint16_t threshold) {
+  const glm::ivec3 low = glm::max(block.low - 1, glm::ivec3(0)), high = glm::min(block.high + 2, dims);
+  for (int z = low.z; z < high.z; ++z) {
+    for (int y = low.y; y < high.y; ++y) {
+      const uint16_t* row = attenuation.values.data() + linearIndex({low.x, y, z}, dims);
+      for (int x = 0; x < high.x - low.x; ++x) {
+        if (row[x] >= threshold) return false;
+      }
+    }
+  }
+  return true;
 }
 
 Towards towardsEye(const ValueGrid& grid, const Camera& camera) {
@@ -75,6 +91,22 @@ Towards towardsEye(const ValueGrid& grid, const Camera& camera) {
 }
 
 }  // namespace
+
+std::string_view attenuationSourceName(AttenuationSource source) {
+  switch (source) {
+    case AttenuationSource::automatic:
+      return "auto";
+    case AttenuationSource::stored:
+      return "stored";
+    case AttenuationSource::corrected:
+      return "corrected";
+    case AttenuationSource::swept:
+      return "swept";
+    case AttenuationSource::quotient:
+      return "quotient";
+  }
+  throw InternalError("internal error: unknown source of attenuation");
+}
 
 struct Splatter::State {
   const ValueGrid& grid;
@@ -86,10 +118,15 @@ struct Splatter::State {
   VisibleCubes cubes;
   std::unique_ptr<gl::Context> context;  // null: cpu
   LightGrid light;
+  std::optional<CoarseVolume> coarse;  ///< made when first needed
 
-  /// Swept or stored attenuation towards a target; `name` gets which.
-  AttenuationGrid attenuationTowards(const Towards& target, AttenuationSource source, StoredLookup lookup,
-                                     std::string& name) const;
+  /// The source that `automatic` stands for. Throws InputError if there is no file to take it from.
+  AttenuationSource chosen(AttenuationSource source, const Towards& target, bool lamp) const;
+  AttenuationGrid attenuationTowards(const Towards& target, AttenuationSource source);
+  void lightVoxels(const Camera& camera, const SplatOptions& options, SplatStatistics& statistics);
+  /// Visible blocks, without hidden ones if asked for, in the order asked for.
+  std::vector<VisibleBlock> blocksToDraw(const AttenuationGrid& attenuation, const SplatOptions& options,
+                                         SplatStatistics& statistics) const;
   /// Draws all blocks once and gives the sums in whole quanta.
   Image drawCells(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
                   const SplatOptions& options, float quantum, SplatStatistics& statistics, Progress& progress);
@@ -99,7 +136,7 @@ struct Splatter::State {
 
 Splatter::Splatter(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer,
                    Backend backend)
-    : state_(std::make_unique<State>(State{grid, file, transfer, {}, {}, {}, {}, nullptr, {}})) {
+    : state_(std::make_unique<State>(State{grid, file, transfer, {}, {}, {}, {}, nullptr, {}, {}})) {
   if (file != nullptr && opacityHash(transfer) != opacityHash(file->transfer())) {
     throw InputError(fmt::format(
         "{}: made with other opacities than the transfer function given; run precompute again with it", file->path()));
@@ -122,23 +159,48 @@ Splatter::Splatter(const ValueGrid& grid, const AttenuationFile* file, const Tra
 Splatter::~Splatter() = default;
 Splatter::Splatter(Splatter&& other) noexcept = default;
 
-AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, AttenuationSource source,
-                                                    StoredLookup lookup, std::string& name) const {
-  const bool nearest = lookup == StoredLookup::nearest;
+AttenuationSource Splatter::State::chosen(AttenuationSource source, const Towards& target, bool lamp) const {
   if (source == AttenuationSource::automatic) {
     // What is stored runs on to the outside, past a target inside the volume.
-    source =
-        file != nullptr && (nearest || !inside(grid, target)) ? AttenuationSource::stored : AttenuationSource::swept;
+    if (file == nullptr || target.inside(grid.dims)) return AttenuationSource::swept;
+    return lamp ? AttenuationSource::stored : AttenuationSource::corrected;
   }
-  if (source == AttenuationSource::swept && !nearest) {
-    name = "swept";
-    return sweptAttenuation(grid, table, cubes, target);
+  if (source != AttenuationSource::swept && file == nullptr) {
+    throw InputError(fmt::format("{} attenuation needs an attenuation file; make one with freevoxel precompute",
+                                 attenuationSourceName(source)));
   }
-  if (file == nullptr) {
-    throw InputError("stored attenuation needs an attenuation file; make one with freevoxel precompute");
+  return source;
+}
+
+AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, AttenuationSource source) {
+  if (source == AttenuationSource::swept) return sweptAttenuation(grid, table, cubes, target);
+  AttenuationGrid result = storedAttenuation(
+      *file, target, source == AttenuationSource::quotient ? StoredLookup::quotient : StoredLookup::interpolated);
+  if (source == AttenuationSource::corrected) {
+    if (!coarse) coarse.emplace(grid, classified);
+    coarse->correct(target, result);
   }
-  name = "stored";
-  return storedAttenuation(*file, target, lookup);
+  return result;
+}
+
+void Splatter::State::lightVoxels(const Camera& camera, const SplatOptions& options, SplatStatistics& statistics) {
+  std::vector<LampAttenuation> lamps;
+  checkLighting(options.lighting);
+  for (const Light& lamp : options.lighting.lights) {
+    const Towards target = lamp.directional ? Towards::direction(grid.placement, lamp.world)
+                                            : Towards::point(grid.placement, lamp.world);
+    const AttenuationSource source = chosen(options.lightAttenuation, target, true);
+    LampAttenuation attenuation;
+    if (source == AttenuationSource::stored || source == AttenuationSource::quotient) {
+      attenuation.stored.emplace(*file, target, source == AttenuationSource::quotient ? StoredLookup::quotient
+                                                                                       : StoredLookup::interpolated);
+    } else {
+      attenuation.grid = attenuationTowards(target, source);
+    }
+    lamps.push_back(std::move(attenuation));
+    statistics.lightAttenuation = attenuationSourceName(source);
+  }
+  light = lightGrid(grid, cubes, file, options.lighting, camera, lamps);
 }
 
 Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
@@ -157,8 +219,10 @@ Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, c
   frame.rays = &rays;
   frame.edge = kBlockEdge;
   frame.inverseQuantum = 1.0f / quantum;
-  std::vector<VisibleBlock> ordered = blocks;
-  putInOrder(ordered, options.order, 0);
+  const bool endRays = options.cull == Cull::hidden && statistics.attenuation != "stored" &&
+                       statistics.attenuation != "quotient";
+  frame.hiddenBelow = endRays ? kHiddenBelow : 0.0f;
+  const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, statistics);
   statistics.setupSeconds += secondsSince(setupStart);
   const Clock::time_point drawStart = Clock::now();
   CellCounts counts;
@@ -172,8 +236,28 @@ Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, c
   statistics.blocks = statistics.splats = counts.blocks;
   statistics.culledBlocks = counts.culledBlocks;
   statistics.fragments = counts.fragments;
+  statistics.pieces = counts.pieces;
   statistics.drawSeconds += secondsSince(drawStart);
   return sums;
+}
+
+std::vector<VisibleBlock> Splatter::State::blocksToDraw(const AttenuationGrid& attenuation, const SplatOptions& options,
+                                                        SplatStatistics& statistics) const {
+  std::vector<VisibleBlock> drawn = blocks;
+  if (options.cull == Cull::hidden) {
+    std::vector<uint8_t> hidden(blocks.size());
+#pragma omp parallel for schedule(dynamic, 1)
+    for (int64_t i = 0; i < int64_t(blocks.size()); ++i)
+      hidden[size_t(i)] = isHidden(blocks[size_t(i)], grid.dims, attenuation,
+                                   uint16_t(kHiddenBelow * AttenuationGrid::kUnit)) ? 1 : 0;
+    drawn.clear();
+    for (size_t i = 0; i < blocks.size(); ++i) {
+      if (hidden[i] == 0) drawn.push_back(blocks[i]);
+    }
+  }
+  statistics.hiddenBlocks = blocks.size() - drawn.size();
+  putInOrder(drawn, options.order, 0);
+  return drawn;
 }
 
 Image Splatter::State::drawKernels(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
@@ -181,10 +265,12 @@ Image Splatter::State::drawKernels(const Camera& camera, const VolumeView& view,
                                    Progress& progress) {
   const std::unique_ptr<KernelCanvas> canvas =
       context ? makeGlKernelCanvas(*context, camera.imageSize) : makeCpuKernelCanvas(camera.imageSize);
-  const KernelSetup setup(view, classified, options.formula, quantum);
+  const KernelSetup setup(
+      view, classified, options.formula == Formula::paper ? KernelEmission::opacity : KernelEmission::telescoping,
+      quantum, options.cull == Cull::hidden ? kHiddenBelow : 0.0f);
   statistics.blocks = statistics.culledBlocks = statistics.splats = statistics.culledSplats = statistics.fragments = 0;
-  std::vector<VisibleBlock> ordered = blocks;
-  putInOrder(ordered, options.order, 0);
+  statistics.hiddenSplats = 0;
+  const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, statistics);
   std::vector<KernelSplat> batch;
   const auto flush = [&] {
     const Clock::time_point start = Clock::now();
@@ -212,6 +298,7 @@ Image Splatter::State::drawKernels(const Camera& camera, const VolumeView& view,
     for (size_t i = 0; i < count; ++i) {
       (drawn[i] ? statistics.blocks : statistics.culledBlocks) += 1;
       statistics.culledSplats += counts[i].culledSplats;
+      statistics.hiddenSplats += counts[i].hiddenSplats;
       statistics.fragments += counts[i].fragments;
       batch.insert(batch.end(), splats[i].begin(), splats[i].end());
     }
@@ -236,17 +323,20 @@ SplatResult Splatter::render(const Camera& camera, const SplatOptions& options, 
 
   const VolumeView view = volumeView(state.grid.placement, camera);
   const Clock::time_point attenuationStart = Clock::now();
-  const AttenuationGrid attenuation =
-      state.attenuationTowards(towardsEye(state.grid, camera), options.attenuation,
-                               paper ? StoredLookup::nearest : StoredLookup::interpolated, statistics.attenuation);
+  const Towards eye = towardsEye(state.grid, camera);
+  // The paper looks up the nearest direction, wherever the eye is.
+  AttenuationSource source = options.attenuation;
+  if (paper && source == AttenuationSource::automatic) source = AttenuationSource::stored;
+  if (paper && source != AttenuationSource::stored) {
+    throw InputError("formula paper takes the nearest of the 26 stored directions; leave --attenuation out");
+  }
+  source = state.chosen(source, eye, false);
+  statistics.attenuation = attenuationSourceName(source);
+  const AttenuationGrid attenuation = paper ? storedAttenuation(*state.file, eye, StoredLookup::nearest)
+                                            : state.attenuationTowards(eye, source);
   statistics.attenuationSeconds = secondsSince(attenuationStart);
   const Clock::time_point lightStart = Clock::now();
-  state.light = lightGrid(state.grid, options.lighting, camera, [&](const Light& light) {
-    const Towards target = light.directional ? Towards::direction(state.grid.placement, light.world)
-                                             : Towards::point(state.grid.placement, light.world);
-    return state.attenuationTowards(target, options.lightAttenuation, StoredLookup::interpolated,
-                                    statistics.lightAttenuation);
-  });
+  state.lightVoxels(camera, options, statistics);
   statistics.lightSeconds = secondsSince(lightStart);
 
   float quantum = options.firstQuantum;
@@ -272,6 +362,46 @@ SplatResult Splatter::render(const Camera& camera, const SplatOptions& options, 
           "referenceLength");
     }
   }
+}
+
+BlendedResult Splatter::renderBlended(const Camera& camera, BlendKernel kernel, const SplatOptions& options,
+                                      Progress& progress) {
+  State& state = *state_;
+  BlendedResult result;
+  SplatStatistics& statistics = result.statistics;
+  statistics.backend = "cpu";
+  const VolumeView view = volumeView(state.grid.placement, camera);
+  const Clock::time_point lightStart = Clock::now();
+  state.lightVoxels(camera, options, statistics);
+  statistics.lightSeconds = secondsSince(lightStart);
+  const Clock::time_point setupStart = Clock::now();
+  const KernelSetup setup(view, state.classified,
+                          kernel == BlendKernel::gaussian ? KernelEmission::peak : KernelEmission::telescoping, 1.0f,
+                          0.0f);
+  std::vector<BlendSplat> splats;
+  KernelSetup::Counts counts;
+  for (const VisibleBlock& block : state.blocks) {
+    if (!setup.mayTouchImage(block.origin, kBlockEdge)) {
+      ++statistics.culledBlocks;
+      continue;
+    }
+    ++statistics.blocks;
+    setup.appendWithDistance(state.grid, state.light, block.origin, kBlockEdge, splats, counts);
+  }
+  statistics.splats = splats.size();
+  statistics.culledSplats = counts.culledSplats;
+  statistics.fragments = counts.fragments;
+  statistics.setupSeconds = secondsSince(setupStart);
+  const Clock::time_point drawStart = Clock::now();
+  progress.begin("blending", 1, "pictures");
+  result.image = blendKernels(std::move(splats), kernel, camera.imageSize);
+  for (size_t i = 0; i < result.image.pixels.size(); ++i) {
+    if (i % 4 != 3) result.image.pixels[i] *= state.light.scale;
+  }
+  progress.advance(1);
+  progress.end();
+  statistics.drawSeconds = secondsSince(drawStart);
+  return result;
 }
 
 }  // namespace freevoxel

@@ -4,11 +4,13 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <string_view>
 
 #include "base/camera.h"
 #include "base/light.h"
 #include "base/progress.h"
 #include "hierarchy/attenuation_file.h"
+#include "splat/blend_kernels.h"
 #include "splat/sums.h"
 #include "splat/value_grid.h"
 #include "volume/transfer_function.h"
@@ -23,11 +25,20 @@ enum class Footprint {
   kernel,  ///< the paper's: a blending kernel round every voxel, integrated along the view ray
 };
 
-/// Where attenuation towards the eye comes from.
+/// Where attenuation towards the eye, or towards a lamp, comes from.
 enum class AttenuationSource {
-  automatic,  ///< stored if there is an attenuation file and the eye is outside the volume, else swept
-  stored,     ///< the 26 directions of the file, which run on to the outside even if the eye is inside
-  swept,      ///< one sweep over the values for this eye
+  automatic,  ///< with an attenuation file, and the target outside the volume: `corrected` for the eye and `stored` for
+              ///< lamps; else swept
+  stored,     ///< the 26 directions of the file, which run on to the outside even if the target is inside
+  corrected,  ///< stored, corrected by a sweep of a coarse copy of the volume
+  swept,      ///< one sweep over the values for this target
+  quotient,   ///< stored, divided by the same at the target's own voxel: the paper's A_B / A_V for an eye inside
+};
+
+/// What is left out of a picture because nobody sees it. Deterministic: the same bits in any order.
+enum class Cull {
+  none,    ///< only what adds nothing
+  hidden,  ///< also what hardly any light reaches the eye from (docs/fidelity.md has what that changes)
 };
 
 /// The order in which blocks, and splats inside a block, are drawn. It changes no bit of the result.
@@ -42,6 +53,7 @@ struct SplatOptions {
   AttenuationSource attenuation = AttenuationSource::automatic;
   AttenuationSource lightAttenuation = AttenuationSource::automatic;  ///< the same, towards lamps
   Lighting lighting;
+  Cull cull = Cull::none;
   SplatOrder order;
   float firstQuantum = 0x1p-20f;  ///< raised by 4 until the sums prove exact; a power of two
 };
@@ -49,13 +61,16 @@ struct SplatOptions {
 struct SplatStatistics {
   uint64_t blocks = 0;           ///< drawn
   uint64_t culledBlocks = 0;     ///< outside the view frustum
+  uint64_t hiddenBlocks = 0;     ///< dropped by Cull::hidden
   uint64_t splats = 0;           ///< drawn: of cells, blocks; of kernels, voxels
   uint64_t culledSplats = 0;     ///< of kernels: visible voxels off screen or nearer than the near plane
+  uint64_t hiddenSplats = 0;     ///< of kernels: dropped by Cull::hidden
   uint64_t fragments = 0;        ///< pixels that splats' bounding rectangles covered
+  uint64_t pieces = 0;           ///< of cells: pieces of rays between two planes of voxels that were traced (cpu only)
   int passes = 1;                ///< 1 + how often the quantum had to be raised
   std::string backend;           ///< "gl" or "cpu"
   std::string glRenderer;        ///< empty for cpu
-  std::string attenuation;       ///< towards the eye: "stored" or "swept"
+  std::string attenuation;       ///< towards the eye: name of the source
   std::string lightAttenuation;  ///< the same towards lamps; empty without any
   double attenuationSeconds = 0, lightSeconds = 0, setupSeconds = 0, drawSeconds = 0;
 };
@@ -64,6 +79,14 @@ struct SplatResult {
   Sums sums;
   SplatStatistics statistics;
 };
+
+struct BlendedResult {
+  Image image;  ///< premultiplied linear RGBA
+  SplatStatistics statistics;
+};
+
+/// Names on the command line and in statistics.
+std::string_view attenuationSourceName(AttenuationSource source);
 
 /// Renders frames of one volume under one transfer function. Move-only.
 class Splatter {
@@ -78,6 +101,11 @@ class Splatter {
 
   /// Same bits for any order, thread count and backend. Throws InputError or MachineError.
   SplatResult render(const Camera& camera, const SplatOptions& options, Progress& progress);
+
+  /// The leaky baseline: kernels, sorted by their distance from the eye and laid over each other from back to front.
+  /// On the CPU only. `options` as for `render`; formula, footprint and source of attenuation do not matter.
+  BlendedResult renderBlended(const Camera& camera, BlendKernel kernel, const SplatOptions& options,
+                              Progress& progress);
 
  private:
   struct State;

@@ -1,9 +1,10 @@
+#include "splat/stored_attenuation.h"
+
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <glm/glm.hpp>
 
-#include "splat/attenuation_grid.h"
+#include "base/error.h"
 #include "splat/direction_lookup.h"
 #include "splat/volume_view.h"
 
@@ -14,21 +15,19 @@ namespace {
 /// code -> (code / 255)^power for powers between two, linear in the power.
 class PowerTable {
  public:
-  void prepare(float low, float high) {
-    low_ = low;
-    scale_ = high > low ? 1.0f / (high - low) : 0.0f;
+  PowerTable(float low, float high) : low_(low), scale_(high > low ? 1.0f / (high - low) : 0.0f) {
     for (int code = 1; code < 256; ++code) {
       const float log = std::log(float(code) / 255.0f);
       atLow_[size_t(code)] = std::exp(low * log);
       difference_[size_t(code)] = std::exp(high * log) - atLow_[size_t(code)];
     }
   }
-  float operator()(uint8_t code, float power) const {
-    return atLow_[code] + (power - low_) * scale_ * difference_[code];
-  }
+  /// How far a power is from low to high, 0..1.
+  float share(float power) const { return (power - low_) * scale_; }
+  float operator()(uint8_t code, float share) const { return atLow_[code] + share * difference_[code]; }
 
  private:
-  float low_ = 1.0f, scale_ = 0.0f;
+  float low_, scale_;
   std::array<float, 256> atLow_{}, difference_{};
 };
 
@@ -37,23 +36,8 @@ float lengthPerPlane(const Towards& towards, glm::dvec3 u) {
   return largest > 0.0 ? float(glm::length(towards.lengthFromIndex * u) / largest) : 1.0f;
 }
 
-AttenuationGrid nearestAttenuation(const AttenuationFile& file, const Towards& towards) {
-  const glm::ivec3 dims = file.dims();
-  AttenuationGrid result;
-  result.values.assign(voxelCount(dims), 65535);
-  const int64_t bricks = int64_t(file.brickCount());
-#pragma omp parallel for schedule(dynamic, 4)
-  for (int64_t b = 0; b < bricks; ++b) {
-    const BrickView brick = file.brick(size_t(b));
-    for (size_t step = 0; step < brick.curve.size(); ++step) {
-      const glm::ivec3 p = brick.origin + glm::ivec3(brick.curve[step].x, brick.curve[step].y, brick.curve[step].z);
-      if (p.x >= dims.x || p.y >= dims.y || p.z >= dims.z) continue;
-      const int nearest =
-          nearestDirection(towards.lengthFromIndex, towards.lengthFromIndex * towards.from(glm::dvec3(p)));
-      result.values[linearIndex(p, dims)] = uint16_t(257 * brick.attenuations[nearest][step]);  // 255 -> 65535
-    }
-  }
-  return result;
+glm::ivec3 localPosition(const BrickView& brick, size_t step) {
+  return {brick.curve[step].x, brick.curve[step].y, brick.curve[step].z};
 }
 
 /// Powers within a brick differ so little beyond this distance that the table is linear to a thousandth of a code.
@@ -61,66 +45,128 @@ constexpr double kNearBricks = 4.0;
 
 }  // namespace
 
-Towards Towards::point(const Placement& placement, glm::dvec3 world) {
-  Towards towards;
-  towards.index = glm::dvec3(glm::inverse(placement.worldFromIndex()) * glm::dvec4(world, 1.0));
-  for (int axis = 0; axis < 3; ++axis) {
-    towards.lengthFromIndex[axis] = placement.direction[axis] * (placement.spacing[axis] / placement.unitLength());
-  }
-  return towards;
+StoredAttenuation::StoredAttenuation(const AttenuationFile& file, const Towards& towards, StoredLookup lookup)
+    : towards_(towards),
+      lookup_(lookup),
+      squaredLength_(glm::transpose(towards.lengthFromIndex) * towards.lengthFromIndex) {
+  if (lookup != StoredLookup::quotient || !towards.inside(file.dims())) return;
+  const glm::ivec3 voxel = glm::clamp(glm::ivec3(glm::round(towards.index)), glm::ivec3(0), file.dims() - 1);
+  const std::optional<size_t> found = file.findBrick(voxel / file.brickEdge());
+  if (!found) return;
+  const BrickView brick = file.brick(*found);
+  const glm::ivec3 local = voxel - brick.origin;
+  const size_t step = brick.steps[size_t((local.z * brick.edge + local.y) * brick.edge + local.x)];
+  atTarget_.emplace();
+  for (size_t k = 0; k < atTarget_->size(); ++k)
+    (*atTarget_)[k] = brick.attenuations[k][step];
 }
 
-Towards Towards::direction(const Placement& placement, glm::dvec3 world) {
-  Towards towards = point(placement, world);
-  towards.directional = true;
-  towards.index = glm::inverse(towards.lengthFromIndex) * world;
-  return towards;
+void StoredAttenuation::look(const BrickView& brick, std::span<float> attenuation) const {
+  checkEqual(attenuation.size(), brick.curve.size(), "voxels of a brick");
+  if (lookup_ == StoredLookup::nearest) return lookNearest(brick, attenuation);
+  const glm::dvec3 first(brick.origin), last = first + double(brick.edge - 1);
+  const DirectionTriangle triangle = directionTriangle(towards_.from(0.5 * (first + last)));
+  const uint8_t* planes[3];
+  for (size_t k = 0; k < 3; ++k)
+    planes[k] = brick.attenuations[triangle.index[k]];
+  if (towards_.directional) {
+    // One power, one set of weights: three tables.
+    const float power = lengthPerPlane(towards_, towards_.index);
+    const PowerTable table(power, power);
+    const std::array<float, 3> weights = directionWeights(triangle, towards_.index);
+    std::array<std::array<float, 256>, 3> weighted;
+    for (size_t k = 0; k < 3; ++k) {
+      for (size_t code = 0; code < 256; ++code)
+        weighted[k][code] = weights[k] * table(uint8_t(code), 0.0f);
+    }
+    for (size_t step = 0; step < attenuation.size(); ++step)
+      attenuation[step] = weighted[0][planes[0][step]] + weighted[1][planes[1][step]] + weighted[2][planes[2][step]];
+    return;
+  }
+  float low = lengthPerPlane(towards_, towards_.from(first)), high = low;
+  bool uniform = !atTarget_ && glm::length(towards_.from(0.5 * (first + last))) > kNearBricks * brick.edge;
+  for (int corner = 0; corner < 8 && uniform; ++corner) {
+    const glm::dvec3 u = towards_.from(
+        {(corner & 1) ? last.x : first.x, (corner & 2) ? last.y : first.y, (corner & 4) ? last.z : first.z});
+    uniform = directionTriangle(u) == triangle;
+    const float power = lengthPerPlane(towards_, u);
+    low = std::min(low, power);
+    high = std::max(high, power);
+  }
+  if (!uniform) return lookOneByOne(brick, attenuation);
+  const PowerTable table(low, high);
+  const glm::vec3 fromFirst(towards_.from(first));
+  const glm::mat3 squaredLength(squaredLength_);
+  const int a = triangle.axis[0], b = triangle.axis[1], c = triangle.axis[2];
+  for (size_t step = 0; step < attenuation.size(); ++step) {
+    const glm::vec3 u = fromFirst - glm::vec3(localPosition(brick, step));
+    const float perLargest = 1.0f / std::abs(u[a]);
+    const float toB = std::abs(u[b]) * perLargest, toC = std::abs(u[c]) * perLargest;
+    const float share = table.share(std::sqrt(glm::dot(u, squaredLength * u)) * perLargest);
+    const float value = (1.0f - toB) * table(planes[0][step], share) + (toB - toC) * table(planes[1][step], share) +
+                        toC * table(planes[2][step], share);
+    attenuation[step] = std::clamp(value, 0.0f, 1.0f);
+  }
+}
+
+void StoredAttenuation::lookNearest(const BrickView& brick, std::span<float> attenuation) const {
+  for (size_t step = 0; step < attenuation.size(); ++step) {
+    const glm::dvec3 u = towards_.from(glm::dvec3(brick.origin + localPosition(brick, step)));
+    const int nearest = nearestDirection(towards_.lengthFromIndex, towards_.lengthFromIndex * u);
+    attenuation[step] = float(brick.attenuations[nearest][step]) * (1.0f / 255.0f);
+  }
+}
+
+float StoredAttenuation::divisor(glm::dvec3 u) const {
+  const DirectionTriangle triangle = directionTriangle(u);
+  const std::array<float, 3> weights = directionWeights(triangle, u);
+  const float power = lengthPerPlane(towards_, u);
+  float sum = 0.0f;
+  for (size_t k = 0; k < 3; ++k)
+    sum += weights[k] * std::pow(float((*atTarget_)[size_t(triangle.index[k])]) / 255.0f, power);
+  return sum;
+}
+
+void StoredAttenuation::lookOneByOne(const BrickView& brick, std::span<float> attenuation) const {
+  for (size_t step = 0; step < attenuation.size(); ++step) {
+    const glm::dvec3 u = towards_.from(glm::dvec3(brick.origin + localPosition(brick, step)));
+    if (u == glm::dvec3(0.0)) {
+      attenuation[step] = 1.0f;  // the target's own voxel
+      continue;
+    }
+    const DirectionTriangle triangle = directionTriangle(u);
+    const std::array<float, 3> weights = directionWeights(triangle, u);
+    const float power = lengthPerPlane(towards_, u);
+    float sum = 0.0f;
+    for (size_t k = 0; k < 3; ++k)
+      sum += weights[k] * std::pow(float(brick.attenuations[triangle.index[k]][step]) / 255.0f, power);
+    if (atTarget_) {
+      const float below = divisor(u);
+      sum = below > sum ? sum / below : 1.0f;
+    }
+    attenuation[step] = std::clamp(sum, 0.0f, 1.0f);
+  }
 }
 
 AttenuationGrid storedAttenuation(const AttenuationFile& file, const Towards& towards, StoredLookup lookup) {
-  if (lookup == StoredLookup::nearest) return nearestAttenuation(file, towards);
   const glm::ivec3 dims = file.dims();
+  const StoredAttenuation stored(file, towards, lookup);
   AttenuationGrid result;
-  result.values.assign(voxelCount(dims), 65535);
+  result.values.assign(voxelCount(dims), uint16_t(AttenuationGrid::kUnit));
   const int64_t bricks = int64_t(file.brickCount());
-#pragma omp parallel for schedule(dynamic, 4)
-  for (int64_t b = 0; b < bricks; ++b) {
-    const BrickView brick = file.brick(size_t(b));
-    const glm::dvec3 first(brick.origin), last = first + double(brick.edge - 1);
-    const DirectionTriangle triangle = directionTriangle(towards.from(0.5 * (first + last)));
-    bool uniform = towards.directional;
-    float low = lengthPerPlane(towards, towards.from(first)), high = low;
-    if (!uniform) {
-      uniform = glm::length(towards.from(0.5 * (first + last))) > kNearBricks * brick.edge;
-      for (int corner = 0; corner < 8; ++corner) {
-        const glm::dvec3 u = towards.from(
-            {(corner & 1) ? last.x : first.x, (corner & 2) ? last.y : first.y, (corner & 4) ? last.z : first.z});
-        uniform = uniform && directionTriangle(u) == triangle;
-        const float power = lengthPerPlane(towards, u);
-        low = std::min(low, power);
-        high = std::max(high, power);
+#pragma omp parallel
+  {
+    std::vector<float> attenuation;
+#pragma omp for schedule(dynamic, 4)
+    for (int64_t b = 0; b < bricks; ++b) {
+      const BrickView brick = file.brick(size_t(b));
+      attenuation.resize(brick.curve.size());
+      stored.look(brick, attenuation);
+      for (size_t step = 0; step < attenuation.size(); ++step) {
+        const glm::ivec3 p = brick.origin + localPosition(brick, step);
+        if (p.x >= dims.x || p.y >= dims.y || p.z >= dims.z) continue;
+        result.values[linearIndex(p, dims)] = uint16_t(attenuation[step] * AttenuationGrid::kUnit + 0.5f);
       }
-    }
-    PowerTable table;
-    if (uniform) table.prepare(low, high);
-    for (size_t step = 0; step < brick.curve.size(); ++step) {
-      const glm::ivec3 p = brick.origin + glm::ivec3(brick.curve[step].x, brick.curve[step].y, brick.curve[step].z);
-      if (p.x >= dims.x || p.y >= dims.y || p.z >= dims.z) continue;
-      const glm::dvec3 u = towards.from(glm::dvec3(p));
-      float attenuation = 0.0f;
-      const DirectionTriangle own = uniform ? triangle : directionTriangle(u);
-      if (u == glm::dvec3(0.0)) {
-        attenuation = 1.0f;  // the target's own voxel
-      } else {
-        const std::array<float, 3> weights = directionWeights(own, u);
-        const float power = lengthPerPlane(towards, u);
-        for (size_t k = 0; k < 3; ++k) {
-          const uint8_t code = brick.attenuations[own.index[k]][step];
-          attenuation += weights[k] * (uniform ? table(code, power) : std::pow(float(code) / 255.0f, power));
-        }
-      }
-      result.values[linearIndex(p, dims)] =
-          uint16_t(std::clamp(attenuation, 0.0f, 1.0f) * AttenuationGrid::kUnit + 0.5f);
     }
   }
   return result;

@@ -162,7 +162,8 @@ SHARED_FUNCTION TableValue tableMean(BLOCK_ACCESS float from, float to) {
   return mean;
 }
 
-SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay ray, CellLayout layout_) {
+// `hiddenBelow`: a ray ends where less than this share of its light would reach the eye; 0 for never.
+SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay ray, CellLayout layout_, float hiddenBelow) {
   EXACT float red = 0.0f;
   EXACT float green = 0.0f;
   EXACT float blue = 0.0f;
@@ -174,6 +175,7 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay ray, CellLayout layout_
   EXACT float before = 0.0f;  // value at the end of the piece just done
   bool haveBefore = false;
   int pieces = layout_.endA - layout_.firstA;
+  int traced = 0;
   for (int i = 0; i < pieces; ++i) {
     int k = eyeAbove ? layout_.endA - 1 - i : layout_.firstA + i;
     EXACT float b = ray.baseB + float(k) * ray.slopeB;
@@ -194,6 +196,8 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay ray, CellLayout layout_
       bool first = eyeAbove ? ray.sHigh <= float(k + 1) : ray.sLow >= float(k);
       arriving = first ? 1.0f : rayAttenuation(BLOCK_HAND_ON ray, layout_, k, nearEnd);
     }
+    if (arriving < hiddenBelow) break;
+    ++traced;
     EXACT float valueNear = haveBefore ? before : rayPlace(BLOCK_HAND_ON ray, layout_, k, nearEnd);
     EXACT float valueMiddle = rayPlace(BLOCK_HAND_ON ray, layout_, k, middle);
     EXACT float valueFar = rayPlace(BLOCK_HAND_ON ray, layout_, k, farEnd);
@@ -228,6 +232,7 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay ray, CellLayout layout_
   sums.blue = blue;
   sums.emission = emission;
   sums.depth = depth;
+  sums.pieces = traced;
   return sums;
 }
 

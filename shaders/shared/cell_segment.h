@@ -47,9 +47,10 @@ struct CellLayout {
   int samples;  // where the block's array starts, in voxels
 };
 
-// What one block gives to one pixel; depth in log2.
+// What one block gives to one pixel; depth in log2. `pieces`: how many pieces of the ray that took.
 struct RaySums {
   float red, green, blue, emission, depth;
+  int pieces;
 };
 
 FREEVOXEL_END_SHARED

@@ -6,6 +6,7 @@
 #include <glm/glm.hpp>
 
 #include "splat/attenuation_grid.h"
+#include "splat/stored_attenuation.h"
 #include "tests/splat/scene.h"
 
 namespace freevoxel {

@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 
 #include "base/error.h"
+#include "splat/gradient.h"
 #include "splat/light_grid.h"
 #include "tests/splat/scene.h"
 
@@ -15,19 +16,24 @@ using namespace test;
 
 TEST(Shade, LambertIsTheCosineOnTheSideThatFacesTheEye) {
   const glm::vec3 steep(0.0f, 0.0f, -0.5f), eye(0.0f, 0.0f, 1.0f);
-  EXPECT_FLOAT_EQ(shade(Shading::lambert, steep, {0.0f, 0.0f, 1.0f}, eye), 1.0f);
-  EXPECT_NEAR(shade(Shading::lambert, steep, {std::sin(1.0f), 0.0f, std::cos(1.0f)}, eye), std::cos(1.0f), 1e-6);
-  EXPECT_FLOAT_EQ(shade(Shading::lambert, steep, {0.0f, 0.0f, -1.0f}, eye), 0.0f);
-  EXPECT_FLOAT_EQ(shade(Shading::lambert, -steep, {0.0f, 0.0f, 1.0f}, eye), 1.0f) << "either sign of the gradient";
-  EXPECT_FLOAT_EQ(shade(Shading::lambert, glm::vec3(0.0f), {0.0f, 0.0f, -1.0f}, eye), 1.0f) << "no surface";
-  EXPECT_FLOAT_EQ(shade(Shading::none, steep, {0.0f, 0.0f, -1.0f}, eye), 1.0f);
+  const Surface surface = surfaceFacing(steep, eye);
+  EXPECT_FLOAT_EQ(surface.share, 1.0f);
+  EXPECT_FLOAT_EQ(shade(Shading::lambert, surface, {0.0f, 0.0f, 1.0f}, eye), 1.0f);
+  EXPECT_NEAR(shade(Shading::lambert, surface, {std::sin(1.0f), 0.0f, std::cos(1.0f)}, eye), std::cos(1.0f), 1e-6);
+  EXPECT_FLOAT_EQ(shade(Shading::lambert, surface, {0.0f, 0.0f, -1.0f}, eye), 0.0f);
+  EXPECT_FLOAT_EQ(shade(Shading::lambert, surfaceFacing(-steep, eye), {0.0f, 0.0f, 1.0f}, eye), 1.0f)
+      << "either sign of the gradient";
+  EXPECT_FLOAT_EQ(shade(Shading::lambert, surfaceFacing(glm::vec3(0.0f), eye), {0.0f, 0.0f, -1.0f}, eye), 1.0f)
+      << "no surface";
+  EXPECT_FLOAT_EQ(shade(Shading::none, surface, {0.0f, 0.0f, -1.0f}, eye), 1.0f);
 }
 
 TEST(Shade, PhongAddsAHighlightWhereTheMirroredLightMeetsTheEye) {
-  const glm::vec3 steep(0.0f, 0.0f, 0.5f);
+  const glm::vec3 steep(0.0f, 0.0f, 0.5f), ahead(0.0f, 0.0f, 1.0f);
   const glm::vec3 light(std::sin(0.5f), 0.0f, std::cos(0.5f)), mirrored(-light.x, 0.0f, light.z);
-  EXPECT_NEAR(shade(Shading::phong, steep, light, mirrored), std::cos(0.5f) + kPhongHighlight, 1e-5);
-  EXPECT_LE(shade(Shading::phong, steep, {0, 0, 1}, {0, 0, 1}), largestShade(Shading::phong));
+  EXPECT_NEAR(shade(Shading::phong, surfaceFacing(steep, mirrored), light, mirrored),
+              std::cos(0.5f) + kPhongHighlight, 1e-5);
+  EXPECT_LE(shade(Shading::phong, surfaceFacing(steep, ahead), ahead, ahead), largestShade(Shading::phong));
 }
 
 TEST(Gradient, OfARampIsItsSlopeInWorldAxes) {
@@ -36,15 +42,18 @@ TEST(Gradient, OfARampIsItsSlopeInWorldAxes) {
   volume.header.placement.direction = glm::dmat3(glm::dvec3(0, -1, 0), glm::dvec3(1, 0, 0), glm::dvec3(0, 0, 1));
   const ValueGrid grid = valueGrid(volume, uniformOpacity(0.1));
   for (const int x : {0, 4, 8}) {
-    const glm::vec3 gradient = gradientAt(grid, {x, 2, 3});
+    const glm::vec3 gradient = worldFromIndexGradient(grid) * indexGradient(grid, {x, 2, 3});
     EXPECT_NEAR(gradient.x, 0.0, 1e-7);
     EXPECT_NEAR(gradient.y, -10.0 / 255.0 / 2.0 * 0.5, 1e-7);
     EXPECT_NEAR(gradient.z, 0.0, 1e-7);
   }
 }
 
-AttenuationGrid nothingInTheWay(const ValueGrid& grid) {
-  return {std::vector<uint16_t>(grid.codes.size(), 65535)};
+LightGrid lightWithNothingInTheWay(const ValueGrid& grid, const Lighting& lighting) {
+  LampAttenuation open;
+  open.grid.values.assign(grid.codes.size(), 65535);
+  const std::vector<LampAttenuation> attenuations(lighting.lights.size(), open);
+  return lightGrid(grid, findVisibleCubes(grid, uniformOpacity(0.1)), nullptr, lighting, Camera{}, attenuations);
 }
 
 TEST(LightGrid, AddsAmbientAndLamps) {
@@ -53,22 +62,20 @@ TEST(LightGrid, AddsAmbientAndLamps) {
   Lighting lighting;
   lighting.ambient = 0.25f;
   lighting.lights = {{true, {1, 0, 0}, {1.0f, 0.5f, 0.0f}}, {true, {0, 1, 0}, {0.0f, 0.5f, 2.0f}}};
-  const LightGrid light = lightGrid(grid, lighting, Camera{}, [&](const Light&) { return nothingInTheWay(grid); });
+  const LightGrid light = lightWithNothingInTheWay(grid, lighting);
   EXPECT_FLOAT_EQ(light.scale, 2.25f);
   for (const LightValue& value : light.values) {
     EXPECT_NEAR(value.red / 65535.0 * 2.25, 1.25, 1e-4);
     EXPECT_NEAR(value.green / 65535.0 * 2.25, 1.25, 1e-4);
     EXPECT_NEAR(value.blue / 65535.0 * 2.25, 2.25, 1e-4);
   }
-  EXPECT_TRUE(lightGrid(grid, Lighting{}, Camera{}, nullptr).empty());
+  EXPECT_TRUE(lightWithNothingInTheWay(grid, Lighting{}).empty());
 }
 
 TEST(LightGrid, RefusesNonsense) {
   const ValueGrid grid =
       valueGrid(makeVolume({3, 4, 5}, glm::dvec3(1.0), [](int, int, int) { return 9; }), uniformOpacity(0.1));
-  const auto light = [&](const Lighting& lighting) {
-    lightGrid(grid, lighting, Camera{}, [&](const Light&) { return nothingInTheWay(grid); });
-  };
+  const auto light = [&](const Lighting& lighting) { lightWithNothingInTheWay(grid, lighting); };
   Lighting lighting;
   lighting.lights = {{true, {0, 0, 0}, glm::vec3(1.0f)}};
   EXPECT_THROW(light(lighting), InputError);

@@ -27,10 +27,6 @@ void writeBytes(const std::string& path, const std::string& bytes);
 /// Names of all files in a folder, sorted; hidden ones included.
 std::vector<std::string> listFolder(const std::string& path);
 
-/// A progress that shows nothing.
-inline Progress& silentProgress() {
-  static Progress progress;
-  return progress;
-}
+using freevoxel::silentProgress;
 
 }  // namespace freevoxel::test

@@ -1,0 +1,108 @@
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "base/progress.h"
+#include "bench/fidelity/measured.h"
+#include "bench/fidelity/references.h"
+#include "bench/fidelity/tables.h"
+#include "splat/splat.h"
+
+namespace freevoxel::bench {
+
+namespace {
+
+constexpr double kConvergedStep = 0.125;
+
+/// How one row's pictures are made: by splats, or by a ray caster.
+struct Row {
+  std::string name;
+  std::optional<SplatOptions> splats;
+  std::optional<BlendKernel> blended;
+  Classification classification = Classification::preintegrated;  ///< of the attenuation file
+  RaycastOptions raycast;
+};
+
+SplatOptions splats(Formula formula, Footprint footprint, AttenuationSource source) {
+  SplatOptions options;
+  options.formula = formula;
+  options.footprint = footprint;
+  options.attenuation = source;
+  return options;
+}
+
+std::vector<Row> qualityRows() {
+  constexpr Footprint kKernel = Footprint::kernel, kCell = Footprint::cell;
+  constexpr AttenuationSource kSources[] = {AttenuationSource::stored, AttenuationSource::corrected,
+                                            AttenuationSource::swept};
+  std::vector<Row> rows;
+  const auto add = [&](const std::string& name, Formula formula, Footprint footprint, AttenuationSource source) {
+    Row row;
+    row.name = name;
+    row.splats = splats(formula, footprint, source);
+    // The rule `voxel` is what kernels were made for.
+    if (footprint == kKernel) row.classification = Classification::voxel;
+    rows.push_back(row);
+  };
+  Row coarse{"ray casting, a step of one voxel", {}, {}, Classification::preintegrated, {}};
+  coarse.raycast.step = 1.0;
+  rows.push_back(coarse);
+  rows.push_back({"`blended` in order, normalised kernel", {}, BlendKernel::normalised, Classification::voxel, {}});
+  rows.push_back({"`blended` in order, Gaussian of peak 1", {}, BlendKernel::gaussian, Classification::voxel, {}});
+  add("`paper`, kernel, nearest of 26", Formula::paper, kKernel, AttenuationSource::stored);
+  add("`direct`, kernel, stored", Formula::direct, kKernel, AttenuationSource::stored);
+  for (const AttenuationSource source : kSources)
+    add(fmt::format("`normalised`, kernel, {}", attenuationSourceName(source)), Formula::normalised, kKernel, source);
+  add("`direct`, cell, stored", Formula::direct, kCell, AttenuationSource::stored);
+  add("`direct`, cell, swept", Formula::direct, kCell, AttenuationSource::swept);
+  for (const AttenuationSource source : kSources)
+    add(fmt::format("**`normalised`, cell, {}**", attenuationSourceName(source)), Formula::normalised, kCell, source);
+  return rows;
+}
+
+Image pictureOf(const Row& row, Splatter& splatter, const Scene& scene, const Camera& view, const Folders& folders) {
+  if (row.splats) return resolve(splatter.render(view, *row.splats, silentProgress()).sums, row.splats->formula);
+  if (row.blended) return splatter.renderBlended(view, *row.blended, {}, silentProgress()).image;
+  return reference(scene, view, row.raycast, folders);
+}
+
+}  // namespace
+
+void addQuality(QualityTables& tables, const Scene& scene, const TableOptions& options) {
+  const std::vector<Row> rows = qualityRows();
+  for (Table* table : {&tables.post, &tables.pre}) {
+    if (table->head.empty()) {
+      table->head = {""};
+      for (const Row& row : rows)
+        table->rows.push_back({row.name});
+    }
+    table->head.push_back(scene.source.title);
+  }
+  const std::vector<Camera> views = randomViews(scene.bounds(), options.views, options.imageSize);
+  RaycastOptions post, pre;
+  post.step = pre.step = kConvergedStep;
+  pre.classification = RaycastClassification::pre;
+  std::vector<Image> postReferences, preReferences;
+  for (const Camera& view : views) {
+    postReferences.push_back(reference(scene, view, post, options.folders));
+    preReferences.push_back(reference(scene, view, pre, options.folders));
+  }
+  for (const Classification classification : {Classification::voxel, Classification::preintegrated}) {
+    const AttenuationFile file = attenuationFile(scene, classification, options.folders);
+    Splatter splatter(scene.grid, &file, scene.transfer, Backend::cpu);
+    for (size_t r = 0; r < rows.size(); ++r) {
+      const Row& row = rows[r];
+      if (row.classification != classification) continue;
+      Measured fromPost, fromPre;
+      for (size_t i = 0; i < views.size(); ++i) {
+        const Image picture = pictureOf(row, splatter, scene, views[i], options.folders);
+        fromPost.add(compareImages(picture, postReferences[i]));
+        fromPre.add(compareImages(picture, preReferences[i]));
+      }
+      tables.post.rows[r].push_back(fromPost.text());
+      tables.pre.rows[r].push_back(fromPre.text());
+    }
+  }
+}
+
+}  // namespace freevoxel::bench
