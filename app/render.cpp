@@ -85,8 +85,8 @@ void checkOptions(const RenderOptions& options, const CLI::App& command) {
       if (!allowed && given(name)) throw UsageError(fmt::format("{} needs --formula {}", name, formulas));
     }
   };
-  onlyWith(hasSums(options.formula),
-           {"--order", "--backend", "--sums", "--footprint", "--attenuation", "--cull"}, "normalised, direct or paper");
+  onlyWith(hasSums(options.formula), {"--order", "--backend", "--sums", "--footprint", "--attenuation", "--cull"},
+           "normalised, direct or paper");
   onlyWith(options.formula != PictureFormula::raycast, {"--light-attenuation"}, "normalised, direct, paper or blended");
   onlyWith(options.formula == PictureFormula::raycast, {"--raycast", "--step", "--shadow-step"}, "raycast");
   onlyWith(options.formula == PictureFormula::blended, {"--blend-kernel"}, "blended");
@@ -296,20 +296,19 @@ Command addRender(CLI::App& program, CommonOptions& common) {
       *command, "--step", options->raycast.step, "EDGES",
       fmt::format("of raycast: step in shortest voxel edges, 0.001 to 1000 (default {})", options->raycast.step),
       parseStep);
-  addParsed<double>(*command, "--shadow-step", options->raycast.shadowStep, "EDGES",
-                    fmt::format("of raycast: the same along rays towards lamps (default {})",
-                                options->raycast.shadowStep),
-                    parseStep);
+  addParsed<double>(
+      *command, "--shadow-step", options->raycast.shadowStep, "EDGES",
+      fmt::format("of raycast: the same along rays towards lamps (default {})", options->raycast.shadowStep),
+      parseStep);
   addChoice<Footprint>(*command, "--footprint", options->splat.footprint,
                        {{"cell", Footprint::cell}, {"kernel", Footprint::kernel}},
                        "what a splat covers: cells between voxels, or the paper's kernels round voxels (default for "
                        "formula paper)");
-  const std::vector<std::pair<std::string, AttenuationSource>> sources = {
-      {"auto", AttenuationSource::automatic},
-      {"stored", AttenuationSource::stored},
-      {"corrected", AttenuationSource::corrected},
-      {"swept", AttenuationSource::swept},
-      {"quotient", AttenuationSource::quotient}};
+  const std::vector<std::pair<std::string, AttenuationSource>> sources = {{"auto", AttenuationSource::automatic},
+                                                                          {"stored", AttenuationSource::stored},
+                                                                          {"corrected", AttenuationSource::corrected},
+                                                                          {"swept", AttenuationSource::swept},
+                                                                          {"quotient", AttenuationSource::quotient}};
   addChoice<AttenuationSource>(*command, "--attenuation", options->splat.attenuation, sources,
                                "what light loses on its way to the eye: from the file's 26 directions, from these "
                                "corrected by a coarse sweep, swept for this eye, or from the 26 with the paper's "

@@ -9,8 +9,8 @@
 
 namespace freevoxel {
 
-/// What is blended. Where splats of one plane overlap, opacities a and b leave (1 - a)(1 - b) instead of 1 - a - b: that
-/// is the leak, whatever the kernel. The Gaussian leaks more: it does not even add up to the plane's opacity.
+/// What is blended. Where splats of one plane overlap, opacities a and b leave (1 - a)(1 - b) instead of 1 - a - b:
+/// that is the leak, whatever the kernel. The Gaussian leaks more: it does not even add up to the plane's opacity.
 enum class BlendKernel {
   normalised,  ///< the kernel of all other formulas, whose weights over a plane of voxels add up to one
   gaussian,    ///< peak 1, standard deviation kGaussianDeviation voxels: the sprites of hardware splatters

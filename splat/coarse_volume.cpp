@@ -44,8 +44,7 @@ void CoarseVolume::reduce(const ValueGrid& grid, std::span<const Classified> ofC
           }
         }
         // Whole cubes count, at the border too: what lies beyond it is empty. One coarse edge is `factor` fine ones.
-        extinction_[linearIndex({x, y, z}, grid_.dims)] =
-            sum / (float(factor_ * factor_) * std::numbers::ln2_v<float>);
+        extinction_[linearIndex({x, y, z}, grid_.dims)] = sum / (float(factor_ * factor_) * std::numbers::ln2_v<float>);
       }
     }
   }

@@ -32,8 +32,8 @@ class CoarseVolume {
   ValueGrid grid_;  ///< codes stand for mean extinction
   ClassificationTable table_;
   VisibleCubes cubes_;
-  std::vector<float> extinction_;                 ///< per coarse voxel, log2 per coarse edge
-  std::array<std::vector<float>, 26> depths_;     ///< log2, towards each direction, one edge per plane
+  std::vector<float> extinction_;              ///< per coarse voxel, log2 per coarse edge
+  std::array<std::vector<float>, 26> depths_;  ///< log2, towards each direction, one edge per plane
 };
 
 }  // namespace freevoxel

@@ -130,8 +130,7 @@ class CpuCellCanvas final : public CellCanvas {
   uint64_t drawPixel(const CellFrame& frame, const Prepared& prepared, int x, int y) {
     const PixelRay& ray = (*frame.rays)[size_t(y) * size_t(image_.size.x) + size_t(x)];
     if (!(ray.sLow < ray.sHigh)) return 0;
-    const shared::RaySums sums =
-        shared::traceBlock(
+    const shared::RaySums sums = shared::traceBlock(
         prepared.reader, ray, prepared.layouts[ray.axisAndSide & shared::kRayAxisMask], frame.hiddenBelow);
     float* pixel = image_.at(x, y);
     pixel[0] += shared::roundToWhole(sums.red * frame.inverseQuantum);

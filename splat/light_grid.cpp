@@ -58,8 +58,8 @@ class Lamps {
       } else {
         for (size_t i = 0; i < voxels.size(); ++i) {
           if (!outside(voxels[i]))
-            passed[i] = float(attenuation.grid.values[linearIndex(voxels[i], grid_.dims)]) *
-                        (1.0f / AttenuationGrid::kUnit);
+            passed[i] =
+                float(attenuation.grid.values[linearIndex(voxels[i], grid_.dims)]) * (1.0f / AttenuationGrid::kUnit);
         }
       }
       const Light& light = lighting_.lights[lamp];

@@ -72,8 +72,10 @@ std::vector<Classified> classifyCodes(const ValueCoding& coding, const TransferF
 constexpr float kHiddenBelow = 0x1p-12f;
 
 /// Whether no voxel that the block's rays may touch has attenuation of `threshold` (of AttenuationGrid::kUnit) or more.
+/// Never at the volume's border, where a ray sees what it enters first, whatever the voxels around say.
 bool isHidden(const VisibleBlock& block, glm::ivec3 dims, const AttenuationGrid& attenuation, uint16_t threshold) {
-  const glm::ivec3 low = glm::max(block.low - 1, glm::ivec3(0)), high = glm::min(block.high + 2, dims);
+  const glm::ivec3 low = block.low - 1, high = block.high + 2;
+  if (glm::any(glm::lessThan(low, glm::ivec3(0))) || glm::any(glm::greaterThan(high, dims))) return false;
   for (int z = low.z; z < high.z; ++z) {
     for (int y = low.y; y < high.y; ++y) {
       const uint16_t* row = attenuation.values.data() + linearIndex({low.x, y, z}, dims);
@@ -187,13 +189,13 @@ void Splatter::State::lightVoxels(const Camera& camera, const SplatOptions& opti
   std::vector<LampAttenuation> lamps;
   checkLighting(options.lighting);
   for (const Light& lamp : options.lighting.lights) {
-    const Towards target = lamp.directional ? Towards::direction(grid.placement, lamp.world)
-                                            : Towards::point(grid.placement, lamp.world);
+    const Towards target =
+        lamp.directional ? Towards::direction(grid.placement, lamp.world) : Towards::point(grid.placement, lamp.world);
     const AttenuationSource source = chosen(options.lightAttenuation, target, true);
     LampAttenuation attenuation;
     if (source == AttenuationSource::stored || source == AttenuationSource::quotient) {
-      attenuation.stored.emplace(*file, target, source == AttenuationSource::quotient ? StoredLookup::quotient
-                                                                                       : StoredLookup::interpolated);
+      attenuation.stored.emplace(
+          *file, target, source == AttenuationSource::quotient ? StoredLookup::quotient : StoredLookup::interpolated);
     } else {
       attenuation.grid = attenuationTowards(target, source);
     }
@@ -219,8 +221,8 @@ Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, c
   frame.rays = &rays;
   frame.edge = kBlockEdge;
   frame.inverseQuantum = 1.0f / quantum;
-  const bool endRays = options.cull == Cull::hidden && statistics.attenuation != "stored" &&
-                       statistics.attenuation != "quotient";
+  const bool endRays =
+      options.cull == Cull::hidden && statistics.attenuation != "stored" && statistics.attenuation != "quotient";
   frame.hiddenBelow = endRays ? kHiddenBelow : 0.0f;
   const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, statistics);
   statistics.setupSeconds += secondsSince(setupStart);
@@ -248,8 +250,8 @@ std::vector<VisibleBlock> Splatter::State::blocksToDraw(const AttenuationGrid& a
     std::vector<uint8_t> hidden(blocks.size());
 #pragma omp parallel for schedule(dynamic, 1)
     for (int64_t i = 0; i < int64_t(blocks.size()); ++i)
-      hidden[size_t(i)] = isHidden(blocks[size_t(i)], grid.dims, attenuation,
-                                   uint16_t(kHiddenBelow * AttenuationGrid::kUnit)) ? 1 : 0;
+      hidden[size_t(i)] =
+          isHidden(blocks[size_t(i)], grid.dims, attenuation, uint16_t(kHiddenBelow * AttenuationGrid::kUnit)) ? 1 : 0;
     drawn.clear();
     for (size_t i = 0; i < blocks.size(); ++i) {
       if (hidden[i] == 0) drawn.push_back(blocks[i]);
@@ -265,9 +267,9 @@ Image Splatter::State::drawKernels(const Camera& camera, const VolumeView& view,
                                    Progress& progress) {
   const std::unique_ptr<KernelCanvas> canvas =
       context ? makeGlKernelCanvas(*context, camera.imageSize) : makeCpuKernelCanvas(camera.imageSize);
-  const KernelSetup setup(
-      view, classified, options.formula == Formula::paper ? KernelEmission::opacity : KernelEmission::telescoping,
-      quantum, options.cull == Cull::hidden ? kHiddenBelow : 0.0f);
+  const KernelSetup setup(view, classified,
+                          options.formula == Formula::paper ? KernelEmission::opacity : KernelEmission::telescoping,
+                          quantum, options.cull == Cull::hidden ? kHiddenBelow : 0.0f);
   statistics.blocks = statistics.culledBlocks = statistics.splats = statistics.culledSplats = statistics.fragments = 0;
   statistics.hiddenSplats = 0;
   const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, statistics);
@@ -332,8 +334,8 @@ SplatResult Splatter::render(const Camera& camera, const SplatOptions& options, 
   }
   source = state.chosen(source, eye, false);
   statistics.attenuation = attenuationSourceName(source);
-  const AttenuationGrid attenuation = paper ? storedAttenuation(*state.file, eye, StoredLookup::nearest)
-                                            : state.attenuationTowards(eye, source);
+  const AttenuationGrid attenuation =
+      paper ? storedAttenuation(*state.file, eye, StoredLookup::nearest) : state.attenuationTowards(eye, source);
   statistics.attenuationSeconds = secondsSince(attenuationStart);
   const Clock::time_point lightStart = Clock::now();
   state.lightVoxels(camera, options, statistics);

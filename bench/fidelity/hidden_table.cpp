@@ -25,8 +25,13 @@ float largestAlphaChange(const Image& a, const Image& b) {
 
 void addHidden(Table& table, const Scene& scene, const TableOptions& options) {
   if (table.head.empty()) {
-    table.head = {"volume",          "attenuation",          "culled against not (worst)",
-                  "largest change of alpha", "pieces of rays left out", "blocks left out", "draw time"};
+    table.head = {"volume",
+                  "attenuation",
+                  "culled against not (worst)",
+                  "largest change of alpha",
+                  "pieces of rays left out",
+                  "blocks left out",
+                  "draw time"};
   }
   const AttenuationFile file = attenuationFile(scene, Classification::preintegrated, options.folders);
   Splatter splatter(scene.grid, &file, scene.transfer, Backend::cpu);

@@ -45,8 +45,7 @@ uint64_t blackPixels(const Image& picture, const Image& expected) {
 }  // namespace
 
 void addInside(Table& table, const Scene& scene, const TableOptions& options) {
-  if (table.head.empty())
-    table.head = {"volume", "attenuation", "PSNR (worst)", "NaN or burnt pixels", "black pixels"};
+  if (table.head.empty()) table.head = {"volume", "attenuation", "PSNR (worst)", "NaN or burnt pixels", "black pixels"};
   const AttenuationFile file = attenuationFile(scene, Classification::preintegrated, options.folders);
   Splatter splatter(scene.grid, &file, scene.transfer, Backend::cpu);
   for (const AttenuationSource source :

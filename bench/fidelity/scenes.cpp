@@ -126,7 +126,8 @@ std::vector<Camera> insideViews(const Box& box, int count, glm::ivec2 imageSize)
       camera.eye[axis] = box.lower[axis] + size[axis] * (0.1 + 0.8 * random.next());
     const double azimuth = 2.0 * std::numbers::pi * random.next(), height = 1.9 * random.next() - 0.95;
     const double flat = std::sqrt(1.0 - height * height);
-    camera.target = camera.eye + glm::length(size) * glm::dvec3(flat * std::cos(azimuth), height, flat * std::sin(azimuth));
+    camera.target =
+        camera.eye + glm::length(size) * glm::dvec3(flat * std::cos(azimuth), height, flat * std::sin(azimuth));
     camera.verticalFov = std::numbers::pi / 3.0;
     camera.imageSize = imageSize;
     cameras.push_back(camera);

@@ -81,8 +81,8 @@ void addShadows(Table& table, const Scene& scene, const TableOptions& options) {
       row.insert(row.end(), 3, "-");
     } else {
       AttenuationGrid stored = storedAttenuation(file, target, StoredLookup::interpolated);
-      row.push_back(fmt::format(
-          "{:.1f}", shadowPsnr(samples, storedAttenuation(file, target, StoredLookup::nearest), marched)));
+      row.push_back(
+          fmt::format("{:.1f}", shadowPsnr(samples, storedAttenuation(file, target, StoredLookup::nearest), marched)));
       row.push_back(fmt::format("{:.1f}", shadowPsnr(samples, stored, marched)));
       coarse.correct(target, stored);
       row.push_back(fmt::format("{:.1f}", shadowPsnr(samples, stored, marched)));

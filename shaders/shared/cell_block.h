@@ -82,6 +82,18 @@ SHARED_FUNCTION float rayAttenuation(BLOCK_ACCESS PixelRay ray, CellLayout layou
   return mixExact(low, high, t);
 }
 
+// The largest attenuation of the eight voxels around position k + t.
+SHARED_FUNCTION float largestAttenuation(BLOCK_ACCESS PixelRay ray, CellLayout layout_, int k, float t) {
+  CellPlace at = cellPlace(ray, layout_, k, t);
+  float largest = 0.0f;
+  for (int corner = 0; corner < 8; ++corner) {
+    int voxel = at.voxel + ((corner & 1) != 0 ? layout_.strideB : 0) + ((corner & 2) != 0 ? layout_.strideC : 0) +
+                ((corner & 4) != 0 ? layout_.strideA : 0);
+    largest = max(largest, blockAttenuation(BLOCK_HAND_ON voxel));
+  }
+  return largest;
+}
+
 // Light arriving at position k + t, of one colour channel after the other.
 SHARED_FUNCTION void rayLight(BLOCK_ACCESS PixelRay ray, CellLayout layout_, int k, float t, SHARED_OUT(float) red,
                               SHARED_OUT(float) green, SHARED_OUT(float) blue) {
@@ -195,8 +207,9 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay ray, CellLayout layout_
       // Nothing lies before the first piece of the ray's way through the volume.
       bool first = eyeAbove ? ray.sHigh <= float(k + 1) : ray.sLow >= float(k);
       arriving = first ? 1.0f : rayAttenuation(BLOCK_HAND_ON ray, layout_, k, nearEnd);
+      if (arriving < hiddenBelow && largestAttenuation(BLOCK_HAND_ON ray, layout_, k, nearEnd) < hiddenBelow) break;
     }
-    if (arriving < hiddenBelow) break;
+    if (haveBefore && arriving < hiddenBelow) break;
     ++traced;
     EXACT float valueNear = haveBefore ? before : rayPlace(BLOCK_HAND_ON ray, layout_, k, nearEnd);
     EXACT float valueMiddle = rayPlace(BLOCK_HAND_ON ray, layout_, k, middle);
