@@ -89,8 +89,10 @@ void checkPixelsComplete(const std::string& path, uint64_t bytes) {
       const size_t length = at + (isExplicit ? 8 : 4);
       if (content.size() < length + 4) continue;
       const auto found = numberAt<uint32_t>(file.bytes(), length, order);
+      // Behind the mark of the end stands its length, 0.
+      const size_t mark = content.rfind(end);
       const bool complete = found == UINT32_MAX
-                                ? content.rfind(end) != std::string_view::npos && content.rfind(end) > at
+                                ? mark != std::string_view::npos && mark > at && content.size() - mark >= 8
                                 : content.size() - length - 4 >= found;
       if (complete) continue;
       if (found == UINT32_MAX || found == bytes || found == bytes + 1) {
