@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
@@ -22,7 +23,8 @@ namespace freevoxel::test {
 namespace {
 
 constexpr size_t kBatch = 400;
-constexpr unsigned kSeconds = 20;
+constexpr unsigned kSeconds = 5;
+constexpr uint64_t kMemoryBytes = uint64_t(1) << 30;
 constexpr uint64_t kMostBytes = uint64_t(256) << 20;
 
 /// Counts what arrives.
@@ -66,7 +68,7 @@ LibraryOutcome outcomeOf(const std::string& path) {
   const int said = open(talk.c_str(), O_CREAT | O_TRUNC | O_WRONLY | O_CLOEXEC, 0600);
   dup2(said, STDOUT_FILENO);
   dup2(said, STDERR_FILENO);
-  const rlimit memory{uint64_t(4) << 30, uint64_t(4) << 30};
+  const rlimit memory{kMemoryBytes, kMemoryBytes};
   if (!kUnderAddressSanitizer) setrlimit(RLIMIT_AS, &memory);
   const rlimit noCore{0, 0};
   setrlimit(RLIMIT_CORE, &noCore);
@@ -104,6 +106,7 @@ LibraryOutcomes libraryOutcomes(const std::string& path, size_t count,
     const size_t before = next;
     while (next < end && outcomes[next] != LibraryOutcome::notRun)
       ++next;
+    if (WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM) outcomes[next - 1] = LibraryOutcome::hung;
     if (status != 0) {
       const std::string said = readBytes(talk);
       result.talk = said.substr(said.size() - std::min<size_t>(said.size(), 3000));

@@ -11,7 +11,8 @@ namespace freevoxel::test {
 
 enum class LibraryOutcome : uint8_t {
   notRun,
-  died,       ///< by a signal or a sanitizer, out of memory or time: the parent would say so in one line
+  died,       ///< by a signal or a sanitizer: the parent would say so in one line
+  hung,       ///< went on for longer than tests wait; the parent's patience would end too
   refused,    ///< with an error
   read,       ///< to the end, and it is a volume
   incomplete  ///< without an error, but the parent would not take it
