@@ -102,15 +102,40 @@ TEST_F(Dicom, missingAndMixedSlices) {
   EXPECT_NE(inputError([&] { readVolume(flat); }).find("perpendicular"), std::string::npos);
 }
 
-TEST_F(Dicom, truncationsFail) {
+TEST_F(Dicom, aSliceCutOffInItsFolder) {
   const std::string folder = series();
-  const std::string path = folder + "/IM47";
+  writeBytes(folder + "/README1", "what is named otherwise is passed over");
+  EXPECT_NO_THROW(readVolume(folder));
+  // The first slice, so that it is not missing between others.
+  const std::string path = folder + "/IM50";
   const std::string whole = readBytes(path);
-  // Shorter than its first 132 bytes a file without extension is no DICOM file, and a slice is missing.
-  for (size_t length = 0; length < whole.size(); length += 29) {
+  for (const size_t length : {size_t(0), size_t(100), size_t(131)}) {
+    writeBytes(path, whole.substr(0, length));
+    EXPECT_EQ(inputError([&] { readVolume(folder); }),
+              path + ": is named like the DICOM files beside it, but is none; it may be cut short");
+  }
+  for (const size_t length : {size_t(132), size_t(300), whole.size() - 1}) {
     writeBytes(path, whole.substr(0, length));
     EXPECT_THROW(readVolume(folder), InputError) << length;
   }
+}
+
+TEST_F(Dicom, lyingHeaders) {
+  const auto error = [](const std::function<void(DicomSlice&)>& change) {
+    DicomSlice slice;
+    change(slice);
+    return inputError([&] { readVolume(fileOf(slice.bytes(), "a.dcm")); });
+  };
+  // More pixels than there are, fewer, and more than any machine has.
+  EXPECT_NE(error([](DicomSlice& s) { s.rows = 8; }), "");
+  EXPECT_NE(error([](DicomSlice& s) { s.rows = 6; }), "");
+  EXPECT_NE(error([](DicomSlice& s) { s.rows = s.columns = 65535; }), "");
+  EXPECT_NE(error([](DicomSlice& s) { s.frames = "2147483647"; }), "");
+  EXPECT_NE(error([](DicomSlice& s) { s.columns = 0; }), "");
+  EXPECT_NE(error([](DicomSlice& s) { s.pixelSpacing = "-0.5\\0.25"; }).find("expected a positive pixel spacing"),
+            std::string::npos);
+  EXPECT_NE(error([](DicomSlice& s) { s.pixelSpacing = "0\\0.25"; }).find("expected a positive pixel spacing"),
+            std::string::npos);
 }
 
 }  // namespace freevoxel::test
