@@ -103,6 +103,30 @@ void checkPixelsComplete(const std::string& path, uint64_t bytes) {
   }
 }
 
+/// Pixels that are not packed fill the size that the header says, but for a byte to make it even. GDCM fills up with
+/// zeros or leaves out.
+void checkPixelBytes(const std::string& path, const gdcm::DataSet& data, const gdcm::PixelFormat& format,
+                     glm::ivec3 dims) {
+  const gdcm::Tag tag(0x7fe0, 0x0010);
+  if (!data.FindDataElement(tag) || format.GetBitsAllocated() % 8 != 0 || !validDims(dims)) return;
+  const gdcm::ByteValue* value = data.GetDataElement(tag).GetByteValue();
+  if (value == nullptr) return;  // packed: fragments
+  const uint64_t expected = voxelCount(dims) * (format.GetBitsAllocated() / 8u), found = value->GetLength();
+  if (found == expected || found == expected + expected % 2) return;
+  throw InputError(fmt::format("{}: expected {} bytes of pixels ({} x {} x {} of {} bits), found {}", path, expected,
+                               dims.x, dims.y, dims.z, format.GetBitsAllocated(), found));
+}
+
+/// PixelSpacing as it stands: GDCM takes 0 for 1.
+void checkPixelSpacing(const std::string& path, const gdcm::DataSet& data) {
+  std::string text = textOf(data, gdcm::Tag(0x0028, 0x0030));
+  std::replace(text.begin(), text.end(), '\\', ' ');
+  for (const std::string_view word : words(text)) {
+    if (parseNumber<double>(word).value_or(NAN) > 0.0) continue;
+    throw InputError(fmt::format("{}: expected a positive pixel spacing, found {}", path, inQuotes(text)));
+  }
+}
+
 /// ImageOrientationPatient as it stands: GDCM mends it in silence.
 void checkOrientation(const std::string& path, const gdcm::DataSet& data) {
   std::string text = textOf(data, kOrientation);
@@ -151,6 +175,8 @@ Slice readFile(const std::string& path, gdcm::ImageReader& reader) {
     }
   }
   checkOrientation(path, data);
+  checkPixelSpacing(path, data);
+  checkPixelBytes(path, data, image.GetPixelFormat(), slice.dims);
   if (validDims(slice.dims)) checkPixelsComplete(path, voxelCount(slice.dims) * bytesPerValue(slice.stored));
   return slice;
 }
