@@ -137,6 +137,18 @@ void checkStack(const std::string& folder, const std::vector<std::string>& names
   checkEvenlySpaced(folder, numbers);
 }
 
+/// A slice that lost all but its first bytes is no DICOM file any more, but is still named like one.
+void checkNoneIsCut(const std::string& folder, const std::vector<std::string>& dicom,
+                    const std::vector<std::string>& others) {
+  const NumberedName first = takeApart(dicom[0]);
+  if (first.numbers.empty()) return;
+  for (const std::string& name : others) {
+    if (takeApart(name).frame != first.frame) continue;
+    throw InputError(fmt::format("{}: is named like the DICOM files beside it, but is none; it may be cut short",
+                                 (fs::path(folder) / name).string()));
+  }
+}
+
 std::vector<std::string> withFolder(const std::string& folder, const std::vector<std::string>& names) {
   std::vector<std::string> paths;
   for (const std::string& name : names)
@@ -145,7 +157,7 @@ std::vector<std::string> withFolder(const std::string& folder, const std::vector
 }
 
 LibraryRequest folderRequest(const std::string& folder) {
-  std::vector<std::string> dicom, images;
+  std::vector<std::string> dicom, images, others;
   std::error_code error;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     const std::string name = entry->path().filename().string();
@@ -156,6 +168,8 @@ LibraryRequest folderRequest(const std::string& folder) {
       dicom.push_back(name);
     } else if (!imageKind(path).empty()) {
       images.push_back(name);
+    } else {
+      others.push_back(name);
     }
   }
   if (error) throw InputError(fmt::format("{}: cannot read the folder: {}", folder, error.message()));
@@ -164,7 +178,10 @@ LibraryRequest folderRequest(const std::string& folder) {
   if (names.empty()) {
     throw InputError(fmt::format("{}: the folder holds neither DICOM files nor TIFF, PNG or EXR images", folder));
   }
-  if (!dicom.empty()) return dicomRequest(folder, withFolder(folder, dicom));
+  if (!dicom.empty()) {
+    checkNoneIsCut(folder, dicom, others);
+    return dicomRequest(folder, withFolder(folder, dicom));
+  }
   for (const std::string& name : images) {
     if (imageKind(name) != imageKind(images[0])) {
       throw InputError(fmt::format("{}: holds {} and {} images; keep one stack in a folder", folder,

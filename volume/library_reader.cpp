@@ -10,6 +10,7 @@
 #include <cstring>
 #include <new>
 
+#include "base/address_sanitizer.h"
 #include "base/error.h"
 #include "volume/child_messages.h"
 #include "volume/slice_sink.h"
@@ -84,19 +85,6 @@ Request parseRequest(const std::string& bytes) {
   return request;
 }
 
-constexpr bool kUnderAddressSanitizer =
-#if defined(__SANITIZE_ADDRESS__)
-    true;
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer)
-    true;
-#else
-    false;
-#endif
-#else
-    false;
-#endif
-
 void limit(const Request& request) {
   // Whoever asked may be gone before the answer.
   prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -107,7 +95,6 @@ void limit(const Request& request) {
   setrlimit(RLIMIT_CPU, &processor);
   const rlimit noCore{0, 0};
   setrlimit(RLIMIT_CORE, &noCore);
-  // The address sanitizer claims terabytes of addresses.
   const rlimit memory{request.memoryBytes, request.memoryBytes};
   if (!kUnderAddressSanitizer) setrlimit(RLIMIT_AS, &memory);
 }
@@ -155,7 +142,9 @@ class Answer final : public SliceSink {
   const LibraryRequest& request_;
 };
 
-void readAs(const LibraryRequest& request, SliceSink& sink) {
+}  // namespace
+
+void readWithLibrary(const LibraryRequest& request, SliceSink& sink) {
   switch (request.format) {
     case LibraryFormat::imageStack:
       return readImageStack(request, sink);
@@ -167,8 +156,6 @@ void readAs(const LibraryRequest& request, SliceSink& sink) {
   throw InternalError("internal error: no such format of a library");
 }
 
-}  // namespace
-
 int runLibraryReader() {
   // Whatever a library prints is talk, not the answer.
   const int answerDescriptor = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
@@ -179,7 +166,7 @@ int runLibraryReader() {
   try {
     request = parseRequest(readInput());
     limit(request);
-    readAs(request.library, answer);
+    readWithLibrary(request.library, answer);
     answer.end();
     status = 0;
   } catch (const InputError& error) {

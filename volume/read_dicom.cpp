@@ -89,8 +89,10 @@ void checkPixelsComplete(const std::string& path, uint64_t bytes) {
       const size_t length = at + (isExplicit ? 8 : 4);
       if (content.size() < length + 4) continue;
       const auto found = numberAt<uint32_t>(file.bytes(), length, order);
+      // Behind the mark of the end stands its length, 0.
+      const size_t mark = content.rfind(end);
       const bool complete = found == UINT32_MAX
-                                ? content.rfind(end) != std::string_view::npos && content.rfind(end) > at
+                                ? mark != std::string_view::npos && mark > at && content.size() - mark >= 8
                                 : content.size() - length - 4 >= found;
       if (complete) continue;
       if (found == UINT32_MAX || found == bytes || found == bytes + 1) {
@@ -98,6 +100,30 @@ void checkPixelsComplete(const std::string& path, uint64_t bytes) {
                                      bytes, length + 4, content.size() - length - 4));
       }
     }
+  }
+}
+
+/// Pixels that are not packed fill the size that the header says, but for a byte to make it even. GDCM fills up with
+/// zeros or leaves out.
+void checkPixelBytes(const std::string& path, const gdcm::DataSet& data, const gdcm::PixelFormat& format,
+                     glm::ivec3 dims) {
+  const gdcm::Tag tag(0x7fe0, 0x0010);
+  if (!data.FindDataElement(tag) || format.GetBitsAllocated() % 8 != 0 || !validDims(dims)) return;
+  const gdcm::ByteValue* value = data.GetDataElement(tag).GetByteValue();
+  if (value == nullptr) return;  // packed: fragments
+  const uint64_t expected = voxelCount(dims) * (format.GetBitsAllocated() / 8u), found = value->GetLength();
+  if (found == expected || found == expected + expected % 2) return;
+  throw InputError(fmt::format("{}: expected {} bytes of pixels ({} x {} x {} of {} bits), found {}", path, expected,
+                               dims.x, dims.y, dims.z, format.GetBitsAllocated(), found));
+}
+
+/// PixelSpacing as it stands: GDCM takes 0 for 1.
+void checkPixelSpacing(const std::string& path, const gdcm::DataSet& data) {
+  std::string text = textOf(data, gdcm::Tag(0x0028, 0x0030));
+  std::replace(text.begin(), text.end(), '\\', ' ');
+  for (const std::string_view word : words(text)) {
+    if (parseNumber<double>(word).value_or(NAN) > 0.0) continue;
+    throw InputError(fmt::format("{}: expected a positive pixel spacing, found {}", path, inQuotes(text)));
   }
 }
 
@@ -149,6 +175,8 @@ Slice readFile(const std::string& path, gdcm::ImageReader& reader) {
     }
   }
   checkOrientation(path, data);
+  checkPixelSpacing(path, data);
+  checkPixelBytes(path, data, image.GetPixelFormat(), slice.dims);
   if (validDims(slice.dims)) checkPixelsComplete(path, voxelCount(slice.dims) * bytesPerValue(slice.stored));
   return slice;
 }

@@ -7,6 +7,7 @@
 #include "base/error.h"
 #include "base/mapped_file.h"
 #include "volume/component.h"
+#include "volume/header_reading.h"
 #include "volume/slice_sink.h"
 
 namespace freevoxel {
@@ -31,6 +32,35 @@ void checkPngEnd(const std::string& path) {
   if (content.starts_with("\x89PNG") && !content.ends_with(kEnd)) {
     throw InputError(
         fmt::format("{}: cut short: expected the PNG file to end with IEND at byte {}", path, content.size()));
+  }
+}
+
+/// OpenImageIO takes a chain of pages that leads beyond the file's end for its end.
+void checkTiffPages(const std::string& path) {
+  const MappedFile file(path);
+  const std::span<const std::byte> bytes = file.bytes();
+  if (bytes.size() < 16) return;  // refused when it is opened
+  const char first = char(bytes[0]);
+  if ((first != 'I' && first != 'M') || bytes[1] != bytes[0]) return;
+  const ByteOrder order = first == 'I' ? ByteOrder::little : ByteOrder::big;
+  const auto version = numberAt<uint16_t>(bytes, 2, order);
+  if (version != 42 && version != 43) return;
+  const bool big = version == 43;
+  const size_t offsetBytes = big ? 8 : 4, countBytes = big ? 8 : 2, entryBytes = big ? 20 : 12;
+  const auto offsetAt = [&](size_t at) {
+    return big ? numberAt<uint64_t>(bytes, at, order) : numberAt<uint32_t>(bytes, at, order);
+  };
+  const auto fail = [&](int page, uint64_t at) {
+    throw InputError(fmt::format("{}: page {}: cut short or damaged: expected its directory at byte {} of {}", path,
+                                 page, at, bytes.size()));
+  };
+  uint64_t at = offsetAt(big ? 8 : 4);
+  for (int page = 0; at != 0; ++page) {
+    if (page > kMaxDim || at > bytes.size() || bytes.size() - at < countBytes) fail(page, at);
+    const uint64_t entries = big ? numberAt<uint64_t>(bytes, at, order) : numberAt<uint16_t>(bytes, at, order);
+    const uint64_t room = bytes.size() - at - countBytes;
+    if (room < offsetBytes || entries > (room - offsetBytes) / entryBytes) fail(page, at);
+    at = offsetAt(at + countBytes + entries * entryBytes);
   }
 }
 
@@ -69,6 +99,7 @@ class OpenedImage {
  public:
   explicit OpenedImage(const std::string& path) : path_(path) {
     checkPngEnd(path);
+    checkTiffPages(path);
     oiio::ImageSpec wishes;
     wishes["oiio:UnassociatedAlpha"] = 1;
     input_ = oiio::ImageInput::open(path, &wishes);

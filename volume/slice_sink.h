@@ -33,4 +33,7 @@ void readDicom(const LibraryRequest& request, SliceSink& sink);
 /// set its sign.
 void readVdb(const LibraryRequest& request, SliceSink& sink);
 
+/// The one of them that the request's format asks for.
+void readWithLibrary(const LibraryRequest& request, SliceSink& sink);
+
 }  // namespace freevoxel

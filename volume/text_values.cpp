@@ -45,6 +45,7 @@ class TextSource final : public ByteSource {
     if (out.size() < valueBytes) return !out.empty() && nextWord() ? 1 : 0;
     size_t done = 0;
     while (out.size() - done >= valueBytes && nextWord()) {
+      if (atEnd_) throw InputError(fmt::format("{}: value {}: {}", path_, count_, endsInNumber(word_)));
       store(out.subspan(done, valueBytes));
       done += valueBytes;
       ++count_;
@@ -76,6 +77,7 @@ class TextSource final : public ByteSource {
         return true;
       }
     }
+    atEnd_ = true;
     return !word_.empty();
   }
 
@@ -119,10 +121,18 @@ class TextSource final : public ByteSource {
   std::array<std::byte, 1 << 16> buffer_{};
   size_t at_ = 0, filled_ = 0;
   std::string word_;
+  bool atEnd_ = false;  ///< no blank follows the word
   uint64_t count_ = 0;
 };
 
 }  // namespace
+
+std::string endsInNumber(std::string_view word) {
+  return fmt::format(
+      "expected a blank or a new line after every number, found the end of the file after {}: it is cut "
+      "short, or lacks its last new line",
+      inQuotes(word));
+}
 
 std::unique_ptr<ByteSource> readText(std::string path, std::unique_ptr<ByteSource> characters, ValueType type) {
   return std::make_unique<TextSource>(std::move(path), std::move(characters), type);

@@ -8,6 +8,7 @@
 #include "base/mapped_file.h"
 #include "volume/component.h"
 #include "volume/text_parsing.h"
+#include "volume/text_values.h"
 
 namespace freevoxel {
 
@@ -140,9 +141,11 @@ void passValues(Cursor& cursor, const VtkFile& file, Array& array) {
                             inQuotes(array.name), *count, array.offset, cursor.left()));
   }
   for (uint64_t i = 0; i < *count; ++i) {
-    if (cursor.word().empty()) {
+    const std::string_view word = cursor.word();
+    if (word.empty()) {
       cursor.fail(fmt::format("array {}: expected {} values, found {}", inQuotes(array.name), *count, i));
     }
+    if (cursor.left() == 0) cursor.fail(fmt::format("array {}: {}", inQuotes(array.name), endsInNumber(word)));
   }
 }
 

@@ -1,6 +1,7 @@
 // What a library does wrong, told in one line.
 #include <gtest/gtest.h>
 
+#include "base/address_sanitizer.h"
 #include "base/error.h"
 #include "tests/support/test_data.h"
 #include "tests/volume/volume_files.h"
@@ -20,17 +21,6 @@ class ChildReader : public testing::Test {
   TestReader reader;
 };
 
-constexpr bool kSanitized =
-#if defined(__has_feature)
-#if __has_feature(address_sanitizer)
-    true;
-#else
-    false;
-#endif
-#else
-    false;
-#endif
-
 }  // namespace
 
 TEST_F(ChildReader, aLibraryThatDies) {
@@ -49,7 +39,7 @@ TEST_F(ChildReader, aLibraryThatNeverEnds) {
 }
 
 TEST_F(ChildReader, aLibraryThatEatsMemory) {
-  if (kSanitized) GTEST_SKIP() << "the address sanitizer's own memory is beyond any limit";
+  if (kUnderAddressSanitizer) GTEST_SKIP() << "the address sanitizer's own memory is beyond any limit";
   EXPECT_NE(error("a.eat.vdb").find("needs more than"), std::string::npos);
 }
 

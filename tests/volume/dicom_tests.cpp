@@ -5,54 +5,12 @@
 
 #include "base/error.h"
 #include "tests/support/test_data.h"
+#include "tests/volume/dicom_slice.h"
 #include "tests/volume/volume_files.h"
 
 namespace freevoxel::test {
 
 namespace {
-
-/// The least that makes a DICOM image: explicit VR, little-endian.
-struct DicomSlice {
-  std::string series = "1.2.3";
-  glm::dvec3 position{0.0};
-  std::string orientation = "1\\0\\0\\0\\1\\0";
-  std::string slope, intercept;
-  int z = 0;
-
-  static std::string element(uint16_t group, uint16_t number, const std::string& vr, std::string value) {
-    if (value.size() % 2 == 1) value += vr == "UI" ? '\0' : ' ';
-    Bytes bytes;
-    bytes.add(group).add(number).text(vr);
-    if (vr == "OW" || vr == "OB") {
-      bytes.add(uint16_t(0)).add(uint32_t(value.size()));
-    } else {
-      bytes.add(uint16_t(value.size()));
-    }
-    return bytes.text(value).str();
-  }
-  static std::string number(uint16_t value) { return Bytes().add(value).str(); }
-
-  std::string bytes() const {
-    const std::string meta = element(2, 1, "OB", std::string("\0\1", 2)) +
-                             element(2, 2, "UI", "1.2.840.10008.5.1.4.1.1.2") + element(2, 3, "UI", "1.2.3.4") +
-                             element(2, 0x10, "UI", "1.2.840.10008.1.2.1") + element(2, 0x12, "UI", "1.2.3.5");
-    std::string all = std::string(128, '\0') + "DICM" + element(2, 0, "UL", Bytes().add(uint32_t(meta.size())).str()) +
-                      meta + element(8, 0x16, "UI", "1.2.840.10008.5.1.4.1.1.2") +
-                      element(8, 0x18, "UI", "1.2.3.4." + std::to_string(z + 1)) + element(8, 0x60, "CS", "CT") +
-                      element(0x18, 0x50, "DS", "99") + element(0x20, 0x0e, "UI", series) +
-                      element(0x20, 0x32, "DS", fmt::format("{}\\{}\\{}", position.x, position.y, position.z)) +
-                      element(0x20, 0x37, "DS", orientation) + element(0x28, 2, "US", number(1)) +
-                      element(0x28, 4, "CS", "MONOCHROME2") + element(0x28, 0x10, "US", number(7)) +
-                      element(0x28, 0x11, "US", number(5)) + element(0x28, 0x30, "DS", "0.5\\0.25") +
-                      element(0x28, 0x100, "US", number(16)) + element(0x28, 0x101, "US", number(12)) +
-                      element(0x28, 0x102, "US", number(11)) + element(0x28, 0x103, "US", number(0));
-    if (!intercept.empty()) all += element(0x28, 0x1052, "DS", intercept) + element(0x28, 0x1053, "DS", slope);
-    Bytes pixels;
-    for (int i = 0; i < 35; ++i)
-      pixels.add(uint16_t(z * 35 + i));
-    return all + element(0x7fe0, 0x10, "OW", pixels.str());
-  }
-};
 
 /// A folder of eleven slices, named against their order, each changed by `change`.
 std::string series(const std::function<void(DicomSlice&)>& change = {}) {
@@ -144,15 +102,40 @@ TEST_F(Dicom, missingAndMixedSlices) {
   EXPECT_NE(inputError([&] { readVolume(flat); }).find("perpendicular"), std::string::npos);
 }
 
-TEST_F(Dicom, truncationsFail) {
+TEST_F(Dicom, aSliceCutOffInItsFolder) {
   const std::string folder = series();
-  const std::string path = folder + "/IM47";
+  writeBytes(folder + "/README1", "what is named otherwise is passed over");
+  EXPECT_NO_THROW(readVolume(folder));
+  // The first slice, so that it is not missing between others.
+  const std::string path = folder + "/IM50";
   const std::string whole = readBytes(path);
-  // Shorter than its first 132 bytes a file without extension is no DICOM file, and a slice is missing.
-  for (size_t length = 0; length < whole.size(); length += 29) {
+  for (const size_t length : {size_t(0), size_t(100), size_t(131)}) {
+    writeBytes(path, whole.substr(0, length));
+    EXPECT_EQ(inputError([&] { readVolume(folder); }),
+              path + ": is named like the DICOM files beside it, but is none; it may be cut short");
+  }
+  for (const size_t length : {size_t(132), size_t(300), whole.size() - 1}) {
     writeBytes(path, whole.substr(0, length));
     EXPECT_THROW(readVolume(folder), InputError) << length;
   }
+}
+
+TEST_F(Dicom, lyingHeaders) {
+  const auto error = [](const std::function<void(DicomSlice&)>& change) {
+    DicomSlice slice;
+    change(slice);
+    return inputError([&] { readVolume(fileOf(slice.bytes(), "a.dcm")); });
+  };
+  // More pixels than there are, fewer, and more than any machine has.
+  EXPECT_NE(error([](DicomSlice& s) { s.rows = 8; }).find("expected 80 bytes of pixels"), std::string::npos);
+  EXPECT_NE(error([](DicomSlice& s) { s.rows = 6; }).find("expected 60 bytes of pixels"), std::string::npos);
+  EXPECT_NE(error([](DicomSlice& s) { s.rows = s.columns = 65535; }), "");
+  EXPECT_NE(error([](DicomSlice& s) { s.frames = "2147483647"; }), "");
+  EXPECT_NE(error([](DicomSlice& s) { s.columns = 0; }), "");
+  EXPECT_NE(error([](DicomSlice& s) { s.pixelSpacing = "-0.5\\0.25"; }).find("expected a positive pixel spacing"),
+            std::string::npos);
+  EXPECT_NE(error([](DicomSlice& s) { s.pixelSpacing = "0\\0.25"; }).find("expected a positive pixel spacing"),
+            std::string::npos);
 }
 
 }  // namespace freevoxel::test

@@ -22,8 +22,8 @@ std::string error(const std::string& content) {
 std::string textOf(ValueType type) {
   std::string text;
   for (uint64_t i = 0; i < voxelCount(kDims); ++i)
-    text += fmt::format("{} ", testValue(type, i));
-  return text + "\n";
+    text += fmt::format("{}{}", testValue(type, i), i % 9 == 8 || i == 384 ? "\n" : " ");
+  return text;
 }
 
 VolumeOptions component(const std::string& name) {
@@ -83,13 +83,9 @@ TEST(LegacyVtk, everyTruncationFails) {
   const std::string values = testBytes(ValueType::u8, ByteOrder::big);
   const std::string binary = fileOf(kBinary + scalars + values, "v.vtk");
   expectTruncationsFail(binary, [&] { readVolume(binary); });
-  // The last blank and the last digits of a text do not matter or cannot be missed.
-  const std::string text = start("ASCII") + "POINT_DATA 385\n" + scalars + textOf(ValueType::u8);
-  const std::string path = fileOf(text, "v.vtk");
-  for (size_t length = 0; length + 5 < text.size(); ++length) {
-    writeBytes(path, text.substr(0, length));
-    EXPECT_THROW(readVolume(path), InputError) << length;
-  }
+  // Text needs one blank after its last number.
+  const std::string text = fileOf(start("ASCII") + "POINT_DATA 385\n" + scalars + textOf(ValueType::u8), "v.vtk");
+  expectTruncationsFail(text, [&] { readVolume(text); });
 }
 
 TEST(LegacyVtk, whatCannotBeIsRefused) {

@@ -65,8 +65,9 @@ TEST(MetaImage, text) {
   std::string numbers;
   for (const char c : kBytes)
     numbers += std::to_string(int(uint8_t(c))) + " ";
-  expectTestValues(readText(kStart + "BinaryData = False\nElementType = MET_UCHAR\n" + kLocal + numbers),
-                   ValueType::u8);
+  const std::string path = fileOf(kStart + "BinaryData = False\nElementType = MET_UCHAR\n" + kLocal + numbers, "v.mha");
+  expectTestValues(readVolume(path), ValueType::u8);
+  expectTruncationsFail(path, [&] { readVolume(path); });
 }
 
 TEST(MetaImage, channelsAndFrames) {

@@ -23,6 +23,7 @@ std::string testBytes(ValueType type, ByteOrder order);
 void expectTestValues(const Volume& volume, ValueType type);
 
 std::string gzip(const std::string& bytes);
+std::string zlibStream(const std::string& bytes);
 
 /// The text of the InputError that `action` throws; fails the test if it throws none, or if the text is not one line.
 std::string inputError(const std::function<void()>& action);
