@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -11,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <utility>
+#include <vector>
 
 #include "base/error.h"
 
@@ -96,6 +98,27 @@ void AtomicFile::writeAt(uint64_t offset, std::span<const std::byte> bytes) {
     bytes = bytes.subspan(size_t(written));
     offset += uint64_t(written);
   }
+}
+
+void AtomicFile::moveDown(uint64_t from, uint64_t to, uint64_t bytes) {
+  check(to <= from, "bytes are moved down");
+  if (to == from) return;
+  constexpr uint64_t kPiece = uint64_t(1) << 20;
+  std::vector<std::byte> buffer(std::min(bytes, kPiece));
+  while (bytes > 0) {
+    const ssize_t count = pread(descriptor_, buffer.data(), std::min(bytes, kPiece), off_t(from));
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw failure(path_, "cannot read back", errno);
+    check(count > 0, "bytes to be moved have been written");
+    writeAt(to, std::span(buffer).first(size_t(count)));
+    from += uint64_t(count);
+    to += uint64_t(count);
+    bytes -= uint64_t(count);
+  }
+}
+
+void AtomicFile::truncate(uint64_t bytes) {
+  if (ftruncate(descriptor_, off_t(bytes)) != 0) throw failure(path_, "cannot shorten", errno);
 }
 
 void AtomicFile::commit() {

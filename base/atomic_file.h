@@ -27,6 +27,10 @@ class AtomicFile {
   void reserve(uint64_t bytes);
   /// Writes all of `bytes` at `offset`. Throws MachineError.
   void writeAt(uint64_t offset, std::span<const std::byte> bytes);
+  /// Copies `bytes` bytes from offset `from` to `to` <= `from`. Throws MachineError.
+  void moveDown(uint64_t from, uint64_t to, uint64_t bytes);
+  /// Makes the file `bytes` long. Throws MachineError.
+  void truncate(uint64_t bytes);
   /// Syncs and renames onto path(). Throws MachineError.
   void commit();
 

@@ -99,9 +99,6 @@ TEST(Precompute, refusesWhatItCannotWrite) {
   PrecomputeOptions options;
   options.brickEdge = 12;
   EXPECT_THROW(attempt(folder + "/a.fvx", options), InputError);
-  options = {};
-  options.layout = Layout::compact;
-  EXPECT_THROW(attempt(folder + "/a.fvx", options), InputError);
   EXPECT_THROW(attempt(folder + "/missing/a.fvx", {}), MachineError);
   EXPECT_TRUE(test::listFolder(folder).empty());
 }
