@@ -65,6 +65,17 @@ bool holdsBrickData(const SectionType& type) {
   return isAmong(kDenseBricks, type) || isAmong(kCompactBricks, type);
 }
 
+uint32_t largestCode(std::span<const std::byte> codes, int bytesPerCode) {
+  const auto largest = [&]<class Code>(const Code* begin) {
+    Code result = 0;
+    for (size_t i = 0; i < codes.size() / sizeof(Code); ++i)
+      result = std::max(result, begin[i]);
+    return uint32_t(result);
+  };
+  return bytesPerCode == 1 ? largest(reinterpret_cast<const uint8_t*>(codes.data()))
+                           : largest(reinterpret_cast<const uint16_t*>(codes.data()));
+}
+
 /// The hashes of what brickSections() hold of a brick.
 constexpr std::array<uint64_t BrickEntry::*, 3> kBrickHashes = {&BrickEntry::codesHash, &BrickEntry::backwardHash,
                                                                 &BrickEntry::forwardHash};
@@ -434,11 +445,10 @@ void AttenuationFile::unpack(BrickView& view, size_t i, DirectionSet directions)
   const std::span<std::byte> codes(view.unpacked.get(), codeBytes);
   view.codes = codes.data();
   expectSound(unpackCodes(stored(0, i), view.bytesPerCode, codes), 0);
-  for (size_t step = 0; step < view.curve.size(); ++step) {
-    if (view.code(step) > coding_.largest) {
-      expectSound(fmt::format("expected codes up to {}, found {}", coding_.largest, view.code(step)), 0);
-    }
+  if (const uint32_t largest = largestCode(codes, view.bytesPerCode); largest > coding_.largest) {
+    expectSound(fmt::format("expected codes up to {}, found {}", coding_.largest, largest), 0);
   }
+  if ((directions & kAllDirections) == 0) return;
 
   BrickRegeneration::Brick brick;
   brick.codes = codes;

@@ -20,10 +20,9 @@
 
 namespace freevoxel {
 
-/// One stored brick of the finest level, valid as long as the AttenuationFile: views into the map (layout dense) or into
-/// memory of its own (compact). Move-only.
-/// Planes hold edge^3 entries in curve order (see `curve`). Voxels of the brick that lie outside the volume have code 0
-/// and attenuation 255 and must be skipped: origin + curve[i] >= dims.
+/// One stored brick of the finest level, valid as long as the AttenuationFile: views into the map (layout dense) or
+/// into memory of its own (compact). Move-only. Planes hold edge^3 entries in curve order (see `curve`). Voxels of the
+/// brick that lie outside the volume have code 0 and attenuation 255 and must be skipped: origin + curve[i] >= dims.
 struct BrickView {
   uint64_t hilbertIndex = 0;  ///< of the brick among bricks
   glm::ivec3 origin{0};       ///< its first voxel
@@ -32,7 +31,7 @@ struct BrickView {
   std::span<const LocalPosition> curve;  ///< step along the curve -> place in the brick
   std::span<const uint16_t> steps;       ///< local linear index (x fastest) -> step along the curve
   int bytesPerCode = 1;
-  const std::byte* codes = nullptr;      ///< value codes, 1 or 2 bytes each, little-endian
+  const std::byte* codes = nullptr;  ///< value codes, 1 or 2 bytes each, little-endian
   /// Per direction index: round(255 * A), in layout compact off by one at most; null unless asked for.
   const uint8_t* attenuations[26] = {};
   std::unique_ptr<std::byte[]> unpacked;  ///< what the above point into, if not the map

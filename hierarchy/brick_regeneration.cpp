@@ -44,28 +44,32 @@ struct CellOrder {
   std::vector<Cell> cells;
 };
 
-/// A brick while it is swept, voxels x fastest, or with x and y exchanged: so that no direction depends on the voxel
-/// before in the same row.
-struct SweptBrick {
-  int edge = 0;
-  glm::ivec3 extent{0};
+/// What the codes of a brick contribute to segments, voxels x fastest. Vectors have kSlack on either side.
+struct BrickDepths {
   std::vector<float> code, own, integralHigh, integralLow;
 
-  float* at(std::vector<float>& floats) const { return floats.data() + kSlack; }
-  const float* at(const std::vector<float>& floats) const { return floats.data() + kSlack; }
+  void resize(size_t voxels) {
+    for (auto* floats : {&code, &own, &integralHigh, &integralLow})
+      floats->resize(voxels + 2 * kSlack);
+  }
 };
 
-/// A direction in a swept brick.
+/// A brick as it is swept along one direction: voxels x fastest, or for directions along x with x and y exchanged, so
+/// that none depends on the voxel before in its row.
 struct SweptDirection {
-  glm::ivec3 step{0};
+  int edge;
+  glm::ivec3 extent;  ///< voxels inside the volume
+  glm::ivec3 step;
   DirectionFaces shapes;
-  const uint8_t* faces = nullptr;
+  const uint8_t* faces;
+  /// The transmittance that takes voxel v + step to v is segments[v].
+  const float* segments;
 };
 
-/// What a thread needs, kept from brick to brick.
+/// What a thread needs, kept from brick to brick. Floats have kSlack on either side.
 struct RegenerationScratch {
-  SweptBrick brick, exchanged;
-  std::vector<float> segments;      ///< transmittance from a voxel to the next one along a direction
+  BrickDepths depths;
+  std::vector<float> segments, exchangedSegments;
   std::vector<float> attenuations;  ///< 255 A of every voxel
   std::vector<uint8_t> slices;      ///< kSliceBytes of every slice of every cell, x fastest, then y, then z
 };
@@ -95,14 +99,57 @@ V transmittance(D floats, V depth) {
   return hn::BitCast(floats, hn::Add(hn::BitCast(integers, power), hn::ShiftLeft<23>(whole)));
 }
 
-/// segments[v] = transmittance between v and v + offset, offset > 0, for all v where that lies in the arrays.
-void segmentRun(const SweptBrick& brick, int offset, float* HWY_RESTRICT segments) {
+/// Fills `depths` for voxels whose codes lie along the curve in `codes`, voxel v at steps[v].
+template <class Code>
+void spreadCodes(const Code* HWY_RESTRICT codes, const uint16_t* HWY_RESTRICT steps, size_t voxels,
+                 const BrickRegeneration::CodeDepth* HWY_RESTRICT table, BrickDepths& depths) {
+  float* HWY_RESTRICT code = depths.code.data() + kSlack;
+  float* HWY_RESTRICT own = depths.own.data() + kSlack;
+  float* HWY_RESTRICT high = depths.integralHigh.data() + kSlack;
+  float* HWY_RESTRICT low = depths.integralLow.data() + kSlack;
+#if HWY_TARGET == HWY_SCALAR
+  for (size_t v = 0; v < voxels; ++v) {
+    const BrickRegeneration::CodeDepth& depth = table[codes[steps[v]]];
+    code[v] = depth.code;
+    own[v] = depth.own;
+    high[v] = depth.integralHigh;
+    low[v] = depth.integralLow;
+  }
+#else
+  // Four entries become four of each member.
+  const hn::FixedTag<float, 4> floats;
+  const hn::FixedTag<double, 2> pairs;
+  const auto entry = [&](size_t v) { return hn::LoadU(floats, &table[codes[steps[v]]].code); };
+  for (size_t v = 0; v < voxels; v += 4) {
+    const auto a = entry(v), b = entry(v + 1), c = entry(v + 2), d = entry(v + 3);
+    const auto lower = [&](auto one, auto two) { return hn::BitCast(pairs, hn::InterleaveLower(floats, one, two)); };
+    const auto upper = [&](auto one, auto two) { return hn::BitCast(pairs, hn::InterleaveUpper(floats, one, two)); };
+    const auto ab = lower(a, b), cd = lower(c, d), abUpper = upper(a, b), cdUpper = upper(c, d);
+    hn::StoreU(hn::BitCast(floats, hn::InterleaveLower(pairs, ab, cd)), floats, code + v);
+    hn::StoreU(hn::BitCast(floats, hn::InterleaveUpper(pairs, ab, cd)), floats, own + v);
+    hn::StoreU(hn::BitCast(floats, hn::InterleaveLower(pairs, abUpper, cdUpper)), floats, high + v);
+    hn::StoreU(hn::BitCast(floats, hn::InterleaveUpper(pairs, abUpper, cdUpper)), floats, low + v);
+  }
+#endif
+}
+
+void spreadBrick(const BrickRegeneration::Brick& brick, const uint16_t* steps, size_t voxels,
+                 const BrickRegeneration::CodeDepth* table, BrickDepths& depths) {
+  if (brick.bytesPerCode == 1) {
+    spreadCodes(reinterpret_cast<const uint8_t*>(brick.codes.data()), steps, voxels, table, depths);
+  } else {
+    spreadCodes(reinterpret_cast<const uint16_t*>(brick.codes.data()), steps, voxels, table, depths);
+  }
+}
+
+/// segments[v] = transmittance between v and v + offset, offset > 0, for all v where that lies in the brick.
+void segmentRun(const BrickDepths& depths, size_t voxels, int offset, float* HWY_RESTRICT segments) {
   const hn::ScalableTag<float> floats;
-  const size_t end = size_t(brick.edge) * size_t(brick.edge) * size_t(brick.edge) - size_t(offset);
-  const float* HWY_RESTRICT code = brick.at(brick.code);
-  const float* HWY_RESTRICT own = brick.at(brick.own);
-  const float* HWY_RESTRICT high = brick.at(brick.integralHigh);
-  const float* HWY_RESTRICT low = brick.at(brick.integralLow);
+  const size_t end = voxels - size_t(offset);
+  const float* HWY_RESTRICT code = depths.code.data() + kSlack;
+  const float* HWY_RESTRICT own = depths.own.data() + kSlack;
+  const float* HWY_RESTRICT high = depths.integralHigh.data() + kSlack;
+  const float* HWY_RESTRICT low = depths.integralLow.data() + kSlack;
   for (size_t v = 0; v < end; v += hn::Lanes(floats)) {
     const size_t next = v + size_t(offset);
     const auto codes = hn::Sub(hn::LoadU(floats, code + next), hn::LoadU(floats, code + v));
@@ -123,19 +170,18 @@ void faceRow(D floats, const uint8_t* HWY_RESTRICT bytes, int edge, float* HWY_R
     hn::StoreU(hn::ConvertTo(floats, hn::PromoteTo(integers, hn::LoadU(narrow, bytes + x))), floats, row + x);
 }
 
-/// attenuations[v] = attenuations[v + step] * segment, from the faces inwards. `segments`: of the segment that starts at
-/// v, at v + segmentOffset.
-template <class D>
-void sweepBrickRows(D floats, const SweptBrick& brick, const SweptDirection& direction,
-                    const float* HWY_RESTRICT segments, int segmentOffset, float* attenuations) {
-  const int edge = brick.edge;
-  const glm::ivec3 step = direction.step, extent = brick.extent;
+/// attenuations[v] = attenuations[v + step] * segments[v], from the faces inwards.
+template <int edge>
+void sweepRows(const SweptDirection& swept, float* attenuations) {
+  const hn::CappedTag<float, std::min(edge, 16)> floats;
+  const glm::ivec3 step = swept.step, extent = swept.extent;
   const int offset = step.x + edge * (step.y + edge * step.z);
   const int outerX = step.x > 0 ? edge - 1 : 0, outerY = step.y > 0 ? edge - 1 : 0, outerZ = step.z > 0 ? edge - 1 : 0;
   const int firstY = step.y < 0 ? 1 : 0, firstZ = step.z < 0 ? 1 : 0;
-  const uint8_t* const acrossZ = direction.faces;
-  const uint8_t* const acrossY = acrossZ + direction.shapes.acrossZ.bytes();
-  const uint8_t* const acrossX = acrossY + direction.shapes.acrossY.bytes();
+  const uint8_t* const acrossZ = swept.faces;
+  const uint8_t* const acrossY = acrossZ + swept.shapes.acrossZ.bytes();
+  const uint8_t* const acrossX = acrossY + swept.shapes.acrossY.bytes();
+  const int widthX = swept.shapes.acrossX.width;
   const auto sweepRow = [&](int y, int z) {
     const int start = edge * (y + edge * z);
     float* row = attenuations + start;
@@ -151,12 +197,10 @@ void sweepBrickRows(D floats, const SweptBrick& brick, const SweptDirection& dir
       std::fill_n(row, edge, kWholeCode);
     } else {
       const float* next = row + offset;
-      const float* segment = segments + start + segmentOffset;
+      const float* segments = swept.segments + start;
       for (size_t x = 0; x < size_t(edge); x += hn::Lanes(floats))
-        hn::StoreU(hn::Mul(hn::LoadU(floats, next + x), hn::LoadU(floats, segment + x)), floats, row + x);
-      if (step.x != 0) {
-        row[outerX] = float(acrossX[(z - firstZ) * direction.shapes.acrossX.width + (y - firstY)]);
-      }
+        hn::StoreU(hn::Mul(hn::LoadU(floats, next + x), hn::LoadU(floats, segments + x)), floats, row + x);
+      if (step.x != 0) row[outerX] = float(acrossX[(z - firstZ) * widthX + (y - firstY)]);
     }
     if (extent.x < edge) {
       const int inside = extent.x - (step.x > 0 ? 1 : 0);
@@ -165,24 +209,21 @@ void sweepBrickRows(D floats, const SweptBrick& brick, const SweptDirection& dir
   };
   // The outermost loop goes inwards; rows of the inner one do not depend on each other.
   for (int i = 0; i < edge; ++i) {
-    const int ascending = (step.z != 0 ? step.z : step.y) < 0 ? i : edge - 1 - i;
+    const int inwards = (step.z != 0 ? step.z : step.y) < 0 ? i : edge - 1 - i;
     for (int j = 0; j < edge; ++j) {
       if (step.z != 0) {
-        sweepRow(j, ascending);
+        sweepRow(j, inwards);
       } else {
-        sweepRow(ascending, j);
+        sweepRow(inwards, j);
       }
     }
   }
 }
 
-void sweepBrick(const SweptBrick& brick, const SweptDirection& direction, const float* segments, int segmentOffset,
-                float* attenuations) {
-  if (brick.edge == 8) {
-    sweepBrickRows(hn::CappedTag<float, 8>(), brick, direction, segments, segmentOffset, attenuations);
-  } else {
-    sweepBrickRows(hn::CappedTag<float, 16>(), brick, direction, segments, segmentOffset, attenuations);
-  }
+void sweepBrick(const SweptDirection& swept, float* attenuations) {
+  if (swept.edge == 8) return sweepRows<8>(swept, attenuations);
+  if (swept.edge == 16) return sweepRows<16>(swept, attenuations);
+  return sweepRows<32>(swept, attenuations);
 }
 
 /// Rounds to bytes: four rows become one row of slices, a lane the four bytes of ascending y.
@@ -260,6 +301,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace freevoxel {
 
+HWY_EXPORT(spreadBrick);
 HWY_EXPORT(segmentRun);
 HWY_EXPORT(sweepBrick);
 HWY_EXPORT(storePlane);
@@ -319,43 +361,14 @@ const CellOrder& cellOrder(int state, int brickOrder) {
   return order;
 }
 
-void spread(const BrickRegeneration::Brick& brick, std::span<const BrickRegeneration::CodeDepth> depths,
-            bool exchanged, bool integrals, SweptBrick& swept) {
-  const size_t voxels = size_t(brick.edge) * size_t(brick.edge) * size_t(brick.edge);
-  const auto edge = size_t(brick.edge);
-  swept.edge = brick.edge;
-  swept.extent = exchanged ? glm::ivec3(brick.extent.y, brick.extent.x, brick.extent.z) : brick.extent;
-  for (auto* floats : {&swept.code, &swept.own, &swept.integralHigh, &swept.integralLow})
-    floats->resize(voxels + 2 * kSlack);
-  float* const code = swept.at(swept.code);
-  float* const own = swept.at(swept.own);
-  float* const high = swept.at(swept.integralHigh);
-  float* const low = swept.at(swept.integralLow);
-  const auto curve = hilbertCurve(brick.hilbertState, std::countr_zero(unsigned(brick.edge)));
-  const auto* bytes = reinterpret_cast<const uint8_t*>(brick.codes.data());
-  for (size_t step = 0; step < voxels; ++step) {
-    const LocalPosition p = curve[step];
-    const size_t to = exchanged ? p.y + edge * (p.x + edge * p.z) : p.x + edge * (p.y + edge * p.z);
-    const size_t entry = brick.bytesPerCode == 1 ? bytes[step] : bytes[2 * step] | size_t(bytes[2 * step + 1]) << 8;
-    const BrickRegeneration::CodeDepth& depth = depths[entry];
-    own[to] = depth.own;
-    if (!integrals) continue;
-    code[to] = depth.code;
-    high[to] = depth.integralHigh;
-    low[to] = depth.integralLow;
+/// to(y, x, z) = from(x, y, z).
+void exchangeXY(const float* from, int edge, float* to) {
+  for (int z = 0; z < edge; ++z) {
+    for (int y = 0; y < edge; ++y) {
+      for (int x = 0; x < edge; ++x)
+        to[(z * edge + x) * edge + y] = from[(z * edge + y) * edge + x];
+    }
   }
-}
-
-SweptDirection sweptDirection(const BrickRegeneration::Brick& brick, int direction) {
-  return {{shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction)},
-          DirectionFaces(direction, brick.edge),
-          brick.faces[size_t(direction)]};
-}
-
-/// Along x: the faces across x are those across y of the exchanged brick.
-SweptDirection exchangedDirection(const BrickRegeneration::Brick& brick, int direction) {
-  const int along = shared::directionIndex(0, shared::directionX(direction), 0);
-  return {{0, shared::directionX(direction), 0}, DirectionFaces(along, brick.edge), brick.faces[size_t(direction)]};
 }
 
 }  // namespace
@@ -384,40 +397,50 @@ BrickRegeneration::BrickRegeneration(Classification classification, const Transf
 void BrickRegeneration::regenerate(const Brick& brick, DirectionSet directions,
                                    const std::array<uint8_t*, shared::kDirectionCount>& planes) const {
   thread_local RegenerationScratch scratch;
-  const size_t voxels = size_t(brick.edge) * size_t(brick.edge) * size_t(brick.edge);
-  scratch.segments.resize(voxels + 2 * kSlack);
-  scratch.attenuations.resize(voxels + 2 * kSlack);
+  const int edge = brick.edge, brickOrder = std::countr_zero(unsigned(edge));
+  const size_t voxels = size_t(edge) * size_t(edge) * size_t(edge);
+  for (auto* floats : {&scratch.segments, &scratch.exchangedSegments, &scratch.attenuations})
+    floats->resize(voxels + 2 * kSlack);
+  scratch.depths.resize(voxels);
   scratch.slices.resize(voxels);
-  const CellOrder& order = cellOrder(brick.hilbertState, std::countr_zero(unsigned(brick.edge)));
-  const bool integrals = classification_ == Classification::preintegrated;
-  bool plain = false, swapped = false;
+  float* const attenuations = scratch.attenuations.data() + kSlack;
+  const CellOrder& order = cellOrder(brick.hilbertState, brickOrder);
+  HWY_DYNAMIC_DISPATCH(spreadBrick)
+  (brick, hilbertSteps(brick.hilbertState, brickOrder).data(), voxels, depths_.data(), scratch.depths);
 
   // Opposite directions share their segments.
   for (int forward = kDirectionsPerSection; forward < shared::kDirectionCount; ++forward) {
     const int backward = shared::oppositeDirection(forward);
-    const bool wanted[2] = {(directions >> backward & 1) != 0, (directions >> forward & 1) != 0};
-    if (!wanted[0] && !wanted[1]) continue;
-    const bool alongX = forward == shared::directionIndex(1, 0, 0);
-    SweptBrick& swept = alongX ? scratch.exchanged : scratch.brick;
-    if (bool& spreadOut = alongX ? swapped : plain; !spreadOut) {
-      spread(brick, depths_, alongX, integrals, swept);
-      spreadOut = true;
+    if (((directions >> backward | directions >> forward) & 1) == 0) continue;
+    const bool preintegrated = classification_ == Classification::preintegrated;
+    const glm::ivec3 step(shared::directionX(forward), shared::directionY(forward), shared::directionZ(forward));
+    const float* segments = scratch.depths.own.data() + kSlack;  // of a voxel
+    if (preintegrated) {
+      HWY_DYNAMIC_DISPATCH(segmentRun)
+      (scratch.depths, voxels, step.x + edge * (step.y + edge * step.z), scratch.segments.data() + kSlack);
+      segments = scratch.segments.data() + kSlack;  // of a voxel and the next one forwards
     }
-    const SweptDirection one = alongX ? exchangedDirection(brick, forward) : sweptDirection(brick, forward);
-    const int offset = one.step.x + brick.edge * (one.step.y + brick.edge * one.step.z);
-    float* const ofPairs = scratch.segments.data() + kSlack;
-    if (integrals) HWY_DYNAMIC_DISPATCH(segmentRun)(swept, offset, ofPairs);
+    const bool exchanged = step.y == 0 && step.z == 0;
+    if (exchanged) {
+      exchangeXY(segments, edge, scratch.exchangedSegments.data() + kSlack);
+      segments = scratch.exchangedSegments.data() + kSlack;
+    }
     for (const int direction : {backward, forward}) {
-      const bool outwards = direction == forward;
-      if (!wanted[outwards ? 1 : 0]) continue;
-      const SweptDirection way = alongX ? exchangedDirection(brick, direction) : sweptDirection(brick, direction);
-      // The segment of a pair stands at its first voxel, and the transmittance of a voxel at that voxel, the outer one.
-      const float* segments = integrals ? ofPairs : swept.at(swept.own);
-      const int segmentOffset = integrals ? (outwards ? 0 : -offset) : (outwards ? offset : -offset);
-      float* const attenuations = scratch.attenuations.data() + kSlack;
-      HWY_DYNAMIC_DISPATCH(sweepBrick)(swept, way, segments, segmentOffset, attenuations);
+      if ((directions >> direction & 1) == 0) continue;
+      const int sign = direction == forward ? 1 : -1;
+      const glm::ivec3 way = sign * (exchanged ? glm::ivec3(0, 1, 0) : step);
+      const int offset = way.x + edge * (way.y + edge * way.z);
+      // Of a pair the segment stands at the backward voxel; of a voxel it belongs to the pair in which it is the outer.
+      const int start = preintegrated ? std::min(offset, 0) : offset;
+      const SweptDirection swept{edge,
+                                 exchanged ? glm::ivec3(brick.extent.y, brick.extent.x, brick.extent.z) : brick.extent,
+                                 way,
+                                 DirectionFaces(shared::directionIndex(way.x, way.y, way.z), edge),
+                                 brick.faces[size_t(direction)],
+                                 segments + start};
+      HWY_DYNAMIC_DISPATCH(sweepBrick)(swept, attenuations);
       HWY_DYNAMIC_DISPATCH(storePlane)
-      (attenuations, scratch.slices.data(), brick.edge, order, cellShuffles(alongX).data(), alongX,
+      (attenuations, scratch.slices.data(), edge, order, cellShuffles(exchanged).data(), exchanged,
        planes[size_t(direction)]);
     }
   }

@@ -50,6 +50,7 @@ class BrickRegeneration {
     /// either.
     float integralHigh = 0.0f, integralLow = 0.0f;
   };
+  static_assert(sizeof(CodeDepth) == 16);
 
  private:
   Classification classification_;

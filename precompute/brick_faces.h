@@ -17,9 +17,9 @@ struct FaceShape {
   size_t bytes() const { return size_t(rows) * size_t(width); }
 };
 
-/// The voxels of a brick from which one step along a direction leaves the brick, each counted once: across z (rows along
-/// x, ascending y), then of the rest those across y (rows along x, ascending z), then of the rest those across x (rows
-/// along y, ascending z). A direction that does not step along an axis has no face across it.
+/// The voxels of a brick from which one step along a direction leaves the brick, each counted once: across z (rows
+/// along x, ascending y), then of the rest those across y (rows along x, ascending z), then of the rest those across x
+/// (rows along y, ascending z). A direction that does not step along an axis has no face across it.
 struct DirectionFaces {
   FaceShape acrossZ, acrossY, acrossX;
 

@@ -1,5 +1,5 @@
-// Frames: what layout compact stores of a brick, compressed. One frame for its codes and one for the faces of each pass,
-// so that any brick can be read by itself, and its codes without its faces.
+// Frames: what layout compact stores of a brick, compressed. One frame for its codes and one for the faces of each
+// pass, so that any brick can be read by itself, and its codes without its faces.
 //
 // A frame is one byte, the prediction, and one zstd frame that knows the size of its contents:
 //   0 none         the bytes as they are
@@ -28,8 +28,8 @@ Frame packCodes(std::span<const std::byte> codes, int bytesPerCode);
 /// `planes`: the 13 planes of a pass, of edge^3 bytes each along the curve; `steps`: hilbertSteps of the brick.
 Frame packFaces(std::span<const uint8_t> planes, std::span<const uint16_t> steps, int pass, int edge);
 
-/// Undoes packCodes: fills `codes`, or tells what is wrong with the frame. Reads and writes nothing outside whatever the
-/// frame holds, and needs no more memory than `codes` twice.
+/// Undoes packCodes: fills `codes`, or tells what is wrong with the frame. Reads and writes nothing outside whatever
+/// the frame holds, and needs no more memory than `codes` twice.
 std::optional<std::string> unpackCodes(std::span<const std::byte> frame, int bytesPerCode, std::span<std::byte> codes);
 /// Undoes packFaces as far as the faces of each direction, one after another: passFaceBytes(edge) bytes.
 std::optional<std::string> unpackFaces(std::span<const std::byte> frame, int pass, int edge, std::span<uint8_t> faces);

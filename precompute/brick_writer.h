@@ -1,5 +1,5 @@
-// Brick data on their way into the file: permuted to curve order and handed to the layout's store, a slab of bricks at a
-// time.
+// Brick data on their way into the file: permuted to curve order and handed to the layout's store, a slab of bricks at
+// a time.
 #pragma once
 
 #include <array>
