@@ -402,6 +402,11 @@ uint64_t AttenuationFile::brickVoxels() const {
   return uint64_t(metadata_.brickEdge) * metadata_.brickEdge * metadata_.brickEdge;
 }
 
+glm::ivec3 AttenuationFile::brickOrigin(size_t i) const {
+  check(i < bricks_.size(), "brick number is in range");
+  return hilbertPosition(bricks_[i].hilbertIndex, curveOrder_) * brickEdge();
+}
+
 BrickView AttenuationFile::brick(size_t i, DirectionSet directions) const {
   check(i < bricks_.size(), "brick number is in range");
   const BrickEntry& entry = bricks_[i];

@@ -67,6 +67,7 @@ class AttenuationFile {
   std::string command() const;        ///< that made the file; empty if not recorded
 
   size_t brickCount() const { return bricks_.size(); }  ///< stored bricks, sorted along the Hilbert curve
+  glm::ivec3 brickOrigin(size_t i) const;  ///< its first voxel
   /// Codes and the attenuation along `directions`. Layout compact unpacks them here, at a cost for every direction.
   /// Throws InputError if that brick is damaged, which layout dense does not notice.
   BrickView brick(size_t i, DirectionSet directions = kAllDirections) const;

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <glm/glm.hpp>
 
+#include "base/first_exception.h"
+#include "base/grid.h"
 #include "splat/attenuation_grid.h"
 #include "splat/direction_lookup.h"
 #include "splat/volume_view.h"
@@ -37,22 +39,53 @@ float lengthPerPlane(const Towards& towards, glm::dvec3 u) {
   return largest > 0.0 ? float(glm::length(towards.lengthFromIndex * u) / largest) : 1.0f;
 }
 
+/// The directions that `of`, a function of a voxel, gives anywhere in brick b. Of layout dense it asks for all: they
+/// cost nothing.
+template <class F>
+DirectionSet neededDirections(const AttenuationFile& file, size_t b, F&& of) {
+  if (file.layout() == Layout::dense) return kAllDirections;
+  const glm::ivec3 first = file.brickOrigin(b), last = glm::min(first + file.brickEdge(), file.dims());
+  DirectionSet needed = 0;
+  for (int z = first.z; z < last.z; ++z) {
+    for (int y = first.y; y < last.y; ++y) {
+      for (int x = first.x; x < last.x; ++x)
+        needed |= of(glm::ivec3(x, y, z));
+    }
+  }
+  return needed;
+}
+
+DirectionSet directionsOf(const DirectionTriangle& triangle) {
+  DirectionSet set = 0;
+  for (const int direction : triangle.index)
+    set |= DirectionSet(1) << direction;
+  return set;
+}
+
 AttenuationGrid nearestAttenuation(const AttenuationFile& file, const Towards& towards) {
   const glm::ivec3 dims = file.dims();
   AttenuationGrid result;
   result.values.assign(voxelCount(dims), 65535);
-  const int64_t bricks = int64_t(file.brickCount());
-#pragma omp parallel for schedule(dynamic, 4)
-  for (int64_t b = 0; b < bricks; ++b) {
-    const BrickView brick = file.brick(size_t(b));
+  const auto nearest = [&](glm::ivec3 p) {
+    return nearestDirection(towards.lengthFromIndex, towards.lengthFromIndex * towards.from(glm::dvec3(p)));
+  };
+  const auto copyBrick = [&](size_t b) {
+    const DirectionSet needed =
+        towards.directional ? DirectionSet(1) << nearest(file.brickOrigin(b))
+                            : neededDirections(file, b, [&](glm::ivec3 p) { return DirectionSet(1) << nearest(p); });
+    const BrickView brick = file.brick(b, needed);
     for (size_t step = 0; step < brick.curve.size(); ++step) {
       const glm::ivec3 p = brick.origin + glm::ivec3(brick.curve[step].x, brick.curve[step].y, brick.curve[step].z);
       if (p.x >= dims.x || p.y >= dims.y || p.z >= dims.z) continue;
-      const int nearest =
-          nearestDirection(towards.lengthFromIndex, towards.lengthFromIndex * towards.from(glm::dvec3(p)));
-      result.values[linearIndex(p, dims)] = uint16_t(257 * brick.attenuations[nearest][step]);  // 255 -> 65535
+      result.values[linearIndex(p, dims)] = uint16_t(257 * brick.attenuations[nearest(p)][step]);  // 255 -> 65535
     }
-  }
+  };
+  const int64_t bricks = int64_t(file.brickCount());
+  FirstException failure;
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int64_t b = 0; b < bricks; ++b)
+    failure.guard([&] { copyBrick(size_t(b)); });
+  failure.rethrow();
   return result;
 }
 
@@ -82,16 +115,13 @@ AttenuationGrid storedAttenuation(const AttenuationFile& file, const Towards& to
   const glm::ivec3 dims = file.dims();
   AttenuationGrid result;
   result.values.assign(voxelCount(dims), 65535);
-  const int64_t bricks = int64_t(file.brickCount());
-#pragma omp parallel for schedule(dynamic, 4)
-  for (int64_t b = 0; b < bricks; ++b) {
-    const BrickView brick = file.brick(size_t(b));
-    const glm::dvec3 first(brick.origin), last = first + double(brick.edge - 1);
+  const auto lookUpBrick = [&](size_t b) {
+    const glm::dvec3 first(file.brickOrigin(b)), last = first + double(file.brickEdge() - 1);
     const DirectionTriangle triangle = directionTriangle(towards.from(0.5 * (first + last)));
     bool uniform = towards.directional;
     float low = lengthPerPlane(towards, towards.from(first)), high = low;
     if (!uniform) {
-      uniform = glm::length(towards.from(0.5 * (first + last))) > kNearBricks * brick.edge;
+      uniform = glm::length(towards.from(0.5 * (first + last))) > kNearBricks * file.brickEdge();
       for (int corner = 0; corner < 8; ++corner) {
         const glm::dvec3 u = towards.from(
             {(corner & 1) ? last.x : first.x, (corner & 2) ? last.y : first.y, (corner & 4) ? last.z : first.z});
@@ -103,6 +133,10 @@ AttenuationGrid storedAttenuation(const AttenuationFile& file, const Towards& to
     }
     PowerTable table;
     if (uniform) table.prepare(low, high);
+    const BrickView brick =
+        file.brick(b, uniform ? directionsOf(triangle) : neededDirections(file, b, [&](glm::ivec3 p) {
+                     return directionsOf(directionTriangle(towards.from(glm::dvec3(p))));
+                   }));
     for (size_t step = 0; step < brick.curve.size(); ++step) {
       const glm::ivec3 p = brick.origin + glm::ivec3(brick.curve[step].x, brick.curve[step].y, brick.curve[step].z);
       if (p.x >= dims.x || p.y >= dims.y || p.z >= dims.z) continue;
@@ -122,7 +156,13 @@ AttenuationGrid storedAttenuation(const AttenuationFile& file, const Towards& to
       result.values[linearIndex(p, dims)] =
           uint16_t(std::clamp(attenuation, 0.0f, 1.0f) * AttenuationGrid::kUnit + 0.5f);
     }
-  }
+  };
+  const int64_t bricks = int64_t(file.brickCount());
+  FirstException failure;
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int64_t b = 0; b < bricks; ++b)
+    failure.guard([&] { lookUpBrick(size_t(b)); });
+  failure.rethrow();
   return result;
 }
 
