@@ -80,6 +80,7 @@ nlohmann::ordered_json describe(const AttenuationFile& file, Histogram& histogra
       sum += value;
       histogram.add(value);
     }
+    file.checkIntact();
   }
   nlohmann::ordered_json json =
       header(file.dims(), file.placement(), coding.bytes() == 1 ? "u8" : "u16", histogram.low, histogram.high);

@@ -47,6 +47,13 @@ T copyAt(std::span<const std::byte> bytes, uint64_t offset) {
   return value;
 }
 
+template <class T>
+std::vector<T> copyOf(std::span<const std::byte> bytes) {
+  std::vector<T> items(bytes.size() / sizeof(T));
+  if (!items.empty()) std::memcpy(items.data(), bytes.data(), items.size() * sizeof(T));
+  return items;
+}
+
 constexpr std::array<SectionType, 3> kDenseBricks = {section::kCodes, section::kBackward, section::kForward};
 constexpr std::array<SectionType, 3> kCompactBricks = {section::kPackedCodes, section::kPackedBackward,
                                                        section::kPackedForward};
@@ -83,11 +90,13 @@ constexpr std::array<uint64_t BrickEntry::*, 3> kBrickHashes = {&BrickEntry::cod
 }  // namespace
 
 AttenuationFile::AttenuationFile(const std::string& path) : path_(path), map_(path) {
+  map_.guard();
   readHeader();
   readMetadata();
   readTransfer();
   readDirections();
   readBricks();
+  checkIntact();
 }
 
 std::span<const std::byte> AttenuationFile::content(const SectionEntry& entry) const {
@@ -277,8 +286,7 @@ void AttenuationFile::readBricks() {
       checkBrickSection(kDenseBricks[which], denseBytes(which));
   }
   verifySection(entry);
-  // The map starts on a page and the section on a multiple of 8: aligned for BrickEntry.
-  bricks_ = {reinterpret_cast<const BrickEntry*>(content(entry).data()), size_t(entry.items)};
+  bricks_ = copyOf<BrickEntry>(content(entry));
   for (size_t which = 0; which < brickData_.size(); ++which)
     brickData_[which] = content(required(brickSections()[which]));
   if (layout() == Layout::compact) readFrames();
@@ -323,7 +331,7 @@ void AttenuationFile::readFrames() {
   const SectionEntry& entry = required(section::kFrames);
   checkBrickSection(section::kFrames, sizeof(FrameEntry));
   verifySection(entry);
-  frames_ = {reinterpret_cast<const FrameEntry*>(content(entry).data()), size_t(entry.items)};
+  frames_ = copyOf<FrameEntry>(content(entry));
   for (size_t i = 0; i < frames_.size(); ++i) {
     if (frames_[i].zero != 0) {
       throw mismatch(path_, entry.offset + i * sizeof(FrameEntry) + offsetof(FrameEntry, zero), "reserved field", 0,
@@ -522,6 +530,7 @@ void AttenuationFile::verify() const {
     verifyHash(required(brickSections()[which]), brickSectionHash(bricks_, kBrickHashes[which]));
   for (size_t i = 0; i < bricks_.size(); ++i)
     verifyBrick(i);
+  checkIntact();
 }
 
 void AttenuationFile::verifyBrick(size_t i) const {

@@ -42,7 +42,8 @@ struct BrickView {
 };
 
 /// An attenuation file opened for reading. Everything but the payload is checked on open: every offset, size and count
-/// is known to lie inside the file before it is used. Move-only; const members may be called from many threads.
+/// is known to lie inside the file before it is used. A file that is cut meanwhile reads as zeros there: see
+/// checkIntact(). Move-only; const members may be called from many threads.
 class AttenuationFile {
  public:
   /// Throws InputError naming file, offset, what was expected and what was found.
@@ -67,7 +68,7 @@ class AttenuationFile {
   std::string command() const;        ///< that made the file; empty if not recorded
 
   size_t brickCount() const { return bricks_.size(); }  ///< stored bricks, sorted along the Hilbert curve
-  glm::ivec3 brickOrigin(size_t i) const;  ///< its first voxel
+  glm::ivec3 brickOrigin(size_t i) const;               ///< its first voxel
   /// Codes and the attenuation along `directions`. Layout compact unpacks them here, at a cost for every direction.
   /// Throws InputError if that brick is damaged, which layout dense does not notice.
   BrickView brick(size_t i, DirectionSet directions = kAllDirections) const;
@@ -75,6 +76,9 @@ class AttenuationFile {
   /// lies outside the volume).
   std::optional<size_t> findBrick(glm::ivec3 brickPosition) const;
 
+  /// Throws InputError if the file was cut or could not be read since it was opened. Whoever has used bricks calls it
+  /// before he relies on them.
+  void checkIntact() const { map_.checkIntact(); }
   /// Checks every checksum and every padding byte. Throws InputError naming the first damaged section and its offset.
   void verify() const;
   /// Checks one brick against its own checksums, which were checked on open. Throws InputError naming its offset.
@@ -118,9 +122,10 @@ class AttenuationFile {
   Placement placement_;
   ValueCoding coding_;
   TransferFunction transfer_;
-  int curveOrder_ = 0;                  ///< of the curve through the bricks
-  std::span<const BrickEntry> bricks_;  ///< in the map
-  std::span<const FrameEntry> frames_;  ///< in the map; of layout compact
+  int curveOrder_ = 0;  ///< of the curve through the bricks
+  // Copies: what has been checked must not change with the file.
+  std::vector<BrickEntry> bricks_;
+  std::vector<FrameEntry> frames_;  ///< of layout compact
   std::array<std::span<const std::byte>, 3> brickData_;
   std::unique_ptr<const BrickRegeneration> regeneration_;  ///< of layout compact
 };

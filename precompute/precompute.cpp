@@ -248,7 +248,8 @@ void writeFile(const Volume& volume, const TransferFunction& transfer, std::span
   plan[backwardType].hash = brickSectionHash(store->entries(), &BrickEntry::backwardHash);
   plan[forwardType].hash = brickSectionHash(store->entries(), &BrickEntry::forwardHash);
 
-  // The header comes last: without it nothing takes the file for an attenuation file.
+  // The header comes last, when all else is on the disk: without it nothing takes the file for an attenuation file.
+  file.sync();
   FileHeader header{kFileMagic, kFileVersion, uint32_t(plan.sections().size()), plan.fileBytes(), 0};
   header.hash = headerHash(header, plan.sections());
   file.writeAt(sizeof(FileHeader), std::as_bytes(plan.sections()));

@@ -84,7 +84,10 @@ AttenuationGrid nearestAttenuation(const AttenuationFile& file, const Towards& t
   FirstException failure;
 #pragma omp parallel for schedule(dynamic, 4)
   for (int64_t b = 0; b < bricks; ++b)
-    failure.guard([&] { copyBrick(size_t(b)); });
+    failure.guard([&] {
+      copyBrick(size_t(b));
+      file.checkIntact();
+    });
   failure.rethrow();
   return result;
 }
@@ -161,7 +164,10 @@ AttenuationGrid storedAttenuation(const AttenuationFile& file, const Towards& to
   FirstException failure;
 #pragma omp parallel for schedule(dynamic, 4)
   for (int64_t b = 0; b < bricks; ++b)
-    failure.guard([&] { lookUpBrick(size_t(b)); });
+    failure.guard([&] {
+      lookUpBrick(size_t(b));
+      file.checkIntact();
+    });
   failure.rethrow();
   return result;
 }

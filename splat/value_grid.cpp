@@ -83,7 +83,10 @@ ValueGrid valueGrid(const AttenuationFile& file) {
   FirstException failure;
 #pragma omp parallel for schedule(dynamic, 8)
   for (int64_t b = 0; b < count; ++b)
-    failure.guard([&] { copyBrick(size_t(b)); });
+    failure.guard([&] {
+      copyBrick(size_t(b));
+      file.checkIntact();
+    });
   failure.rethrow();
   fillAbsentBricks(grid, std::move(known), bricks, edge);
   return grid;
