@@ -87,6 +87,29 @@ TEST_P(DamagedFile, everyChangedByteIsFound) {
   EXPECT_EQ(complaint(path), "");
 }
 
+/// Cut after it was opened: to nothing, in the middle, in its last page.
+TEST_P(DamagedFile, cutWhileItIsMappedIsFound) {
+  const std::string path = test::temporaryFolder() + "/cut.fvx";
+  const std::string& whole = manyBricks(GetParam());
+  for (const size_t bytes : {size_t(0), whole.size() / 2, whole.size() - 1}) {
+    test::writeBytes(path, whole);
+    const AttenuationFile file(path);
+    file.checkIntact();
+    std::filesystem::resize_file(path, bytes);
+    volatile uint32_t seen = 0;  // so that every byte is read
+    for (size_t i = 0; i < file.brickCount(); ++i) {
+      try {
+        const BrickView brick = file.brick(i);
+        for (size_t step = 0; step < brick.curve.size(); ++step)
+          seen = brick.code(step) + brick.attenuations[0][step] + brick.attenuations[25][step];
+      } catch (const InputError&) {  // zeros are no frame
+      }
+    }
+    EXPECT_THROW(file.checkIntact(), InputError);
+    EXPECT_THROW(file.verify(), InputError);
+  }
+}
+
 TEST(DamagedFiles, bytesAfterTheEndAreFound) {
   const std::string path = test::temporaryFolder() + "/long.fvx";
   test::writeBytes(path, oneBrick() + std::string(1, '\0'));
