@@ -96,7 +96,7 @@ TEST_P(DamagedFile, cutWhileItIsMappedIsFound) {
     const AttenuationFile file(path);
     file.checkIntact();
     std::filesystem::resize_file(path, bytes);
-    volatile uint32_t seen = 0;  // so that every byte is read
+    [[maybe_unused]] volatile uint32_t seen = 0;  // so that every byte is read
     for (size_t i = 0; i < file.brickCount(); ++i) {
       try {
         const BrickView brick = file.brick(i);
@@ -517,16 +517,14 @@ TEST(DamagedFiles, changedFramesAreReadWithoutHarm) {
   const size_t first = Forgery(bytes).sectionOffset("ZCOD");
   size_t refused = 0;
   for (size_t at = first; at < bytes.size(); ++at) {
-    for (int bit = 0; bit < 8; ++bit) {
-      std::string changed = bytes;
-      changed[at] = char(changed[at] ^ (1 << bit));
-      test::writeBytes(path, changed);
-      try {
-        const AttenuationFile file(path);
-        file.brick(0);
-      } catch (const InputError&) {
-        ++refused;
-      }
+    std::string changed = bytes;
+    changed[at] = char(changed[at] ^ (1 << at % 8));
+    test::writeBytes(path, changed);
+    try {
+      const AttenuationFile file(path);
+      file.brick(0);
+    } catch (const InputError&) {
+      ++refused;
     }
   }
   EXPECT_GT(refused, 0u);
