@@ -66,9 +66,9 @@
 //   ZFCF  bricks frames of faces, directions 13..25
 //
 // Bricks stand in CODE, ATTB and ATTF in the order of BRIK, so any one is found by multiplication. Frames fill ZCOD,
-// ZFCB and ZFCF without gap or overlap, in any order. Any brick is checked without reading the others: the header's hash
-// covers that of BRIK, which covers those of the bricks. A brick is stored if one of its voxels is a corner of a visible
-// cell.
+// ZFCB and ZFCF without gap or overlap, in any order. Any brick is checked without reading the others: the header's
+// hash covers that of BRIK, which covers those of the bricks. A brick is stored if one of its voxels is a corner of a
+// visible cell.
 #pragma once
 
 #include <array>
