@@ -72,7 +72,7 @@ nlohmann::ordered_json describe(const AttenuationFile& file, Histogram& histogra
   histogram.high = coding.decode(coding.largest);
   double sum = 0.0;
   for (size_t i = 0; i < file.brickCount(); ++i) {
-    const BrickView brick = file.brick(i);
+    const BrickView brick = file.brick(i, DirectionSet(0));
     for (size_t step = 0; step < brick.curve.size(); ++step) {
       const glm::ivec3 voxel = brick.origin + glm::ivec3(brick.curve[step].x, brick.curve[step].y, brick.curve[step].z);
       if (voxel.x >= file.dims().x || voxel.y >= file.dims().y || voxel.z >= file.dims().z) continue;
@@ -80,6 +80,7 @@ nlohmann::ordered_json describe(const AttenuationFile& file, Histogram& histogra
       sum += value;
       histogram.add(value);
     }
+    file.checkIntact();
   }
   nlohmann::ordered_json json =
       header(file.dims(), file.placement(), coding.bytes() == 1 ? "u8" : "u16", histogram.low, histogram.high);
@@ -91,6 +92,15 @@ nlohmann::ordered_json describe(const AttenuationFile& file, Histogram& histogra
   json["levels"] = file.levels();
   json["bricks"] = file.brickCount();
   json["storedVoxels"] = file.storedVoxels();
+  const auto per = [](uint64_t bytes, uint64_t voxels) { return voxels > 0 ? double(bytes) / double(voxels) : 0.0; };
+  const uint64_t voxels = voxelCount(file.dims());
+  json["occupancy"] = double(file.storedVoxels()) / double(voxels);
+  json["valueBytes"] = file.codeBytes();
+  json["attenuationBytes"] = file.attenuationBytes();
+  json["valueBytesPerVoxel"] = per(file.codeBytes(), voxels);
+  json["attenuationBytesPerVoxel"] = per(file.attenuationBytes(), voxels);
+  json["valueBytesPerStoredVoxel"] = per(file.codeBytes(), file.storedVoxels());
+  json["attenuationBytesPerStoredVoxel"] = per(file.attenuationBytes(), file.storedVoxels());
   return json;
 }
 
@@ -121,10 +131,14 @@ Outcome info(const InfoOptions& options, Session& session) {
     session.statistics["storedVoxels"] = file.storedVoxels();
     session.statistics["bytesPerVoxel"] = double(file.fileBytes()) / double(voxels);
     remarks = fmt::format(
-        "attenuation file: {} voxels, {:.1f} % stored, {} visible, {:.3g} bytes per voxel\n"
+        "attenuation file: {} voxels, {:.1f} % stored, {} visible\n"
+        "bytes per voxel of the volume: {:.3g}, of which values {:.3g}, attenuation {:.3g}; "
+        "per stored voxel: values {:.3g}, attenuation {:.3g}\n"
         "made by: {}\nsum and values: of stored voxels, as coded\n",
         voxels, 100.0 * double(file.storedVoxels()) / double(voxels), file.visibleVoxels(),
-        double(file.fileBytes()) / double(voxels), file.command());
+        double(file.fileBytes()) / double(voxels), json["valueBytesPerVoxel"].get<double>(),
+        json["attenuationBytesPerVoxel"].get<double>(), json["valueBytesPerStoredVoxel"].get<double>(),
+        json["attenuationBytesPerStoredVoxel"].get<double>(), file.command());
   } else {
     const Volume volume = session.timed("read", [&] { return readVolume(options.input, options.raw); });
     json = session.timed("measure", [&] { return describe(volume, options.input, histogram); });
@@ -139,7 +153,7 @@ Outcome info(const InfoOptions& options, Session& session) {
   }
   fmt::print("{}", remarks);
   for (const auto& [key, value] : json.items()) {
-    fmt::print("{:<15} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
+    fmt::print("{:<30} {}\n", key, value.is_string() ? value.get<std::string>() : value.dump());
   }
   printHistogram(histogram);
   return Outcome::done;
@@ -155,7 +169,9 @@ Command addInfo(CLI::App& program, CommonOptions& common) {
   command->add_flag("--json", options->json,
                     "print JSON: dims, spacing, origin, direction (of each axis), bounds (world), type, range, sum, "
                     "nonFinite, fileBytes; for an attenuation "
-                    "file also layout, classification, levels, bricks, storedVoxels (there sum is over stored voxels)");
+                    "file also layout, classification, levels, bricks, storedVoxels, occupancy (their share), "
+                    "valueBytes, attenuationBytes, and both per voxel of the volume (...PerVoxel) and per stored voxel "
+                    "(...PerStoredVoxel) (there sum is over stored voxels)");
   addVolumeOptions(*command, options->raw);
   addCommonOptions(*command, common);
   return {command, [options](Session& session) { return info(*options, session); }};

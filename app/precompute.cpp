@@ -77,8 +77,9 @@ Command addPrecompute(CLI::App& program, CommonOptions& common) {
   addChoice<Classification>(*command, "--classification", options->precompute.classification,
                             {{"voxel", Classification::voxel}, {"preintegrated", Classification::preintegrated}},
                             "whether attenuation multiplies voxels or segments between them");
-  addChoice<Layout>(*command, "--layout", options->precompute.layout, {{"dense", Layout::dense}},
-                    "how attenuation is stored");
+  addChoice<Layout>(*command, "--layout", options->precompute.layout,
+                    {{"dense", Layout::dense}, {"compact", Layout::compact}},
+                    "how attenuation is stored: all of it, or the faces of bricks, compressed");
   addChoice<int>(*command, "--brick", options->precompute.brickEdge, {{"8", 8}, {"16", 16}, {"32", 32}},
                  "edge of a brick in voxels");
   addVolumeOptions(*command, options->raw);

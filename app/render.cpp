@@ -120,7 +120,7 @@ void keepLabelsApart(RenderOptions& options, const CLI::App& command) {
 TransferFunction transferFor(const AttenuationFile& file, const std::string& path) {
   if (path.empty()) return file.transfer();
   TransferFunction transfer = readTransferFunction(path);
-  if (opacityHash(transfer) != opacityHash(file.transfer())) {
+  if (!sameOpacity(transfer, file.transfer())) {
     throw InputError(
         fmt::format("{}: was made for other opacities than those of {}; run: freevoxel precompute VOLUME "
                     "--transfer {} -o {}",

@@ -8,10 +8,12 @@
 namespace freevoxel {
 
 /// A file written under a temporary name beside its target, then synced and renamed. Destroyed before commit(), it
-/// removes the temporary file. Move-only.
+/// removes the temporary file; if the program is killed, the next one that writes the same target does. It tells the
+/// dead from the living by a lock (flock) that every AtomicFile holds on its temporary file. Move-only.
 class AtomicFile {
  public:
-  /// Throws MachineError if the temporary file cannot be made (directory missing, not writable).
+  /// Also removes temporary files of the same target that nobody holds. Throws MachineError if the temporary file
+  /// cannot be made (directory missing, not writable).
   explicit AtomicFile(std::string path);
   ~AtomicFile();
   AtomicFile(AtomicFile&& other) noexcept;
@@ -27,6 +29,12 @@ class AtomicFile {
   void reserve(uint64_t bytes);
   /// Writes all of `bytes` at `offset`. Throws MachineError.
   void writeAt(uint64_t offset, std::span<const std::byte> bytes);
+  /// Copies `bytes` bytes from offset `from` to `to` <= `from`. Throws MachineError.
+  void moveDown(uint64_t from, uint64_t to, uint64_t bytes);
+  /// Makes the file `bytes` long. Throws MachineError.
+  void truncate(uint64_t bytes);
+  /// Returns when all that was written is on the disk. Throws MachineError.
+  void sync();
   /// Syncs and renames onto path(). Throws MachineError.
   void commit();
 

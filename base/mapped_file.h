@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <string>
 
@@ -19,9 +20,21 @@ class MappedFile {
 
   std::span<const std::byte> bytes() const { return {data_, size_}; }
 
+  /// From here on bytes that the file no longer has (somebody cut it, or the disk fails) read as zeros instead of
+  /// ending the program by SIGBUS, and checkIntact() tells of it. At most 64 files at a time; more are not guarded.
+  void guard();
+  /// Throws InputError if the file has not the size it was opened with or, guarded, if any byte read since was lost.
+  /// What was read before is only good if this returns. From many threads.
+  void checkIntact() const;
+
  private:
+  struct Guard;
+
+  std::string path_;
+  int descriptor_ = -1;
   const std::byte* data_ = nullptr;
   size_t size_ = 0;
+  Guard* guard_ = nullptr;  ///< in the table that the signal handler reads
 };
 
 }  // namespace freevoxel

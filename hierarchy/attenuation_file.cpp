@@ -5,11 +5,14 @@
 #include <cmath>
 #include <cstring>
 #include <glm/glm.hpp>
-#include <iterator>
+#include <numeric>
 #include <string_view>
+#include <utility>
 
 #include "base/error.h"
 #include "base/grid.h"
+#include "precompute/brick_faces.h"
+#include "precompute/brick_frames.h"
 #include "precompute/checksums.h"
 #include "precompute/stored_bricks.h"
 
@@ -44,24 +47,56 @@ T copyAt(std::span<const std::byte> bytes, uint64_t offset) {
   return value;
 }
 
+template <class T>
+std::vector<T> copyOf(std::span<const std::byte> bytes) {
+  std::vector<T> items(bytes.size() / sizeof(T));
+  if (!items.empty()) std::memcpy(items.data(), bytes.data(), items.size() * sizeof(T));
+  return items;
+}
+
+constexpr std::array<SectionType, 3> kDenseBricks = {section::kCodes, section::kBackward, section::kForward};
+constexpr std::array<SectionType, 3> kCompactBricks = {section::kPackedCodes, section::kPackedBackward,
+                                                       section::kPackedForward};
+
+bool isAmong(std::span<const SectionType> types, const SectionType& type) {
+  return std::find(types.begin(), types.end(), type) != types.end();
+}
+
 bool isKnown(const SectionType& type) {
-  constexpr SectionType kKnown[] = {section::kMetadata, section::kTransfer, section::kDirections, section::kBricks,
-                                    section::kCodes,    section::kBackward, section::kForward,    section::kCommand};
-  return std::find(std::begin(kKnown), std::end(kKnown), type) != std::end(kKnown);
+  constexpr SectionType kOthers[] = {section::kMetadata, section::kTransfer, section::kDirections,
+                                     section::kBricks,   section::kFrames,   section::kCommand};
+  return isAmong(kOthers, type) || isAmong(kDenseBricks, type) || isAmong(kCompactBricks, type);
 }
 
 bool holdsBrickData(const SectionType& type) {
-  return type == section::kCodes || type == section::kBackward || type == section::kForward;
+  return isAmong(kDenseBricks, type) || isAmong(kCompactBricks, type);
 }
+
+uint32_t largestCode(std::span<const std::byte> codes, int bytesPerCode) {
+  const auto largest = [&]<class Code>(const Code* begin) {
+    Code result = 0;
+    for (size_t i = 0; i < codes.size() / sizeof(Code); ++i)
+      result = std::max(result, begin[i]);
+    return uint32_t(result);
+  };
+  return bytesPerCode == 1 ? largest(reinterpret_cast<const uint8_t*>(codes.data()))
+                           : largest(reinterpret_cast<const uint16_t*>(codes.data()));
+}
+
+/// The hashes of what brickSections() hold of a brick.
+constexpr std::array<uint64_t BrickEntry::*, 3> kBrickHashes = {&BrickEntry::codesHash, &BrickEntry::backwardHash,
+                                                                &BrickEntry::forwardHash};
 
 }  // namespace
 
 AttenuationFile::AttenuationFile(const std::string& path) : path_(path), map_(path) {
+  map_.guard();
   readHeader();
   readMetadata();
   readTransfer();
   readDirections();
   readBricks();
+  checkIntact();
 }
 
 std::span<const std::byte> AttenuationFile::content(const SectionEntry& entry) const {
@@ -126,7 +161,7 @@ void AttenuationFile::readSectionTable(const FileHeader& header) {
       throw mismatch(path_, at, "section type", "one that this version knows", quoted(entry.type));
     }
     if (find(entry.type) != &entry) throw mismatch(path_, at, name, "one of its type", "a second one");
-    const uint64_t alignment = holdsBrickData(entry.type) ? kPageBytes : kSectionAlignment;
+    const uint64_t alignment = isAmong(kDenseBricks, entry.type) ? kPageBytes : kSectionAlignment;
     if (entry.offset < end || entry.offset % alignment != 0) {
       throw mismatch(path_, at + offsetof(SectionEntry, offset), name + ": offset",
                      fmt::format("a multiple of {}, at least {}", alignment, end), entry.offset);
@@ -183,7 +218,8 @@ void AttenuationFile::readMetadata() {
          coding_.bytes() == 1 ? "1" : "2", m.codeBytes);
   expect(m.classification == Classification::voxel || m.classification == Classification::preintegrated,
          offsetof(Metadata, classification), "classification", "0 or 1", uint32_t(m.classification));
-  expect(m.layout == Layout::dense, offsetof(Metadata, layout), "layout", "0, dense", uint32_t(m.layout));
+  expect(m.layout == Layout::dense || m.layout == Layout::compact, offsetof(Metadata, layout), "layout",
+         "0, dense, or 1, compact", uint32_t(m.layout));
   expect(m.levels == 1, offsetof(Metadata, levels), "levels", "1", m.levels);
   expect(m.zero0 == 0, offsetof(Metadata, zero0), "reserved field", "0", m.zero0);
   expect(m.zero1 == 0, offsetof(Metadata, zero1), "reserved field", "0", m.zero1);
@@ -245,15 +281,15 @@ void AttenuationFile::readBricks() {
     throw mismatch(path_, entry.offset, "brick directory", fmt::format("{} bytes an item", sizeof(BrickEntry)),
                    fmt::format("{} items in {} bytes", entry.items, entry.bytes));
   }
-  checkBrickSection(section::kCodes, codeBytes());
-  checkBrickSection(section::kBackward, attenuationBytes());
-  checkBrickSection(section::kForward, attenuationBytes());
+  if (layout() == Layout::dense) {
+    for (size_t which = 0; which < kDenseBricks.size(); ++which)
+      checkBrickSection(kDenseBricks[which], denseBytes(which));
+  }
   verifySection(entry);
-  // The map starts on a page and the section on a multiple of 8: aligned for BrickEntry.
-  bricks_ = {reinterpret_cast<const BrickEntry*>(content(entry).data()), size_t(entry.items)};
-  codes_ = content(required(section::kCodes));
-  backward_ = content(required(section::kBackward));
-  forward_ = content(required(section::kForward));
+  bricks_ = copyOf<BrickEntry>(content(entry));
+  for (size_t which = 0; which < brickData_.size(); ++which)
+    brickData_[which] = content(required(brickSections()[which]));
+  if (layout() == Layout::compact) readFrames();
 
   curveOrder_ = brickCurveOrder(dims(), brickEdge());
   const uint64_t end = uint64_t(1) << (3 * curveOrder_);
@@ -291,6 +327,78 @@ void AttenuationFile::readBricks() {
   }
 }
 
+void AttenuationFile::readFrames() {
+  const SectionEntry& entry = required(section::kFrames);
+  checkBrickSection(section::kFrames, sizeof(FrameEntry));
+  verifySection(entry);
+  frames_ = copyOf<FrameEntry>(content(entry));
+  for (size_t i = 0; i < frames_.size(); ++i) {
+    if (frames_[i].zero != 0) {
+      throw mismatch(path_, entry.offset + i * sizeof(FrameEntry) + offsetof(FrameEntry, zero), "reserved field", 0,
+                     frames_[i].zero);
+    }
+  }
+  for (size_t which = 0; which < brickData_.size(); ++which)
+    checkFrames(which);
+  regeneration_ = std::make_unique<const BrickRegeneration>(classification(), transfer_, coding_);
+}
+
+void AttenuationFile::checkFrames(size_t which) const {
+  const SectionEntry& section = required(brickSections()[which]);
+  if (section.items != frames_.size()) {
+    throw mismatch(path_, section.offset, fmt::format("items of {}", text(section.type)), frames_.size(),
+                   section.items);
+  }
+  const auto at = [&](size_t i, size_t field, size_t fieldBytes) {
+    return required(section::kFrames).offset + i * sizeof(FrameEntry) + field + which * fieldBytes;
+  };
+  std::vector<size_t> byOffset(frames_.size());
+  std::iota(byOffset.begin(), byOffset.end(), size_t(0));
+  std::sort(byOffset.begin(), byOffset.end(), [&](size_t a, size_t b) {
+    return std::pair(frames_[a].offset[which], frames_[a].bytes[which]) <
+           std::pair(frames_[b].offset[which], frames_[b].bytes[which]);
+  });
+  uint64_t end = 0;
+  for (const size_t i : byOffset) {
+    const FrameEntry& frame = frames_[i];
+    if (frame.offset[which] != end) {
+      throw mismatch(path_, at(i, offsetof(FrameEntry, offset), sizeof(uint64_t)),
+                     fmt::format("offset of brick {} in {}", i, text(section.type)), end, frame.offset[which]);
+    }
+    if (frame.bytes[which] > section.bytes - end) {
+      throw mismatch(path_, at(i, offsetof(FrameEntry, bytes), sizeof(uint32_t)),
+                     fmt::format("bytes of brick {} in {}", i, text(section.type)),
+                     fmt::format("at most {}", section.bytes - end), frame.bytes[which]);
+    }
+    end += frame.bytes[which];
+  }
+  if (end != section.bytes) {
+    throw mismatch(path_, section.offset, fmt::format("bytes of the frames of {}", text(section.type)), section.bytes,
+                   end);
+  }
+}
+
+std::array<SectionType, 3> AttenuationFile::brickSections() const {
+  return layout() == Layout::dense ? kDenseBricks : kCompactBricks;
+}
+
+uint64_t AttenuationFile::storedOffset(size_t which, size_t i) const {
+  return layout() == Layout::dense ? i * denseBytes(which) : frames_[i].offset[which];
+}
+
+std::span<const std::byte> AttenuationFile::stored(size_t which, size_t i) const {
+  const uint64_t bytes = layout() == Layout::dense ? denseBytes(which) : frames_[i].bytes[which];
+  return brickData_[which].subspan(size_t(storedOffset(which, i)), size_t(bytes));
+}
+
+uint64_t AttenuationFile::codeBytes() const {
+  return brickData_[0].size();
+}
+
+uint64_t AttenuationFile::attenuationBytes() const {
+  return brickData_[1].size() + brickData_[2].size();
+}
+
 std::string AttenuationFile::command() const {
   const SectionEntry* entry = find(section::kCommand);
   if (entry == nullptr) return {};
@@ -302,7 +410,12 @@ uint64_t AttenuationFile::brickVoxels() const {
   return uint64_t(metadata_.brickEdge) * metadata_.brickEdge * metadata_.brickEdge;
 }
 
-BrickView AttenuationFile::brick(size_t i) const {
+glm::ivec3 AttenuationFile::brickOrigin(size_t i) const {
+  check(i < bricks_.size(), "brick number is in range");
+  return hilbertPosition(bricks_[i].hilbertIndex, curveOrder_) * brickEdge();
+}
+
+BrickView AttenuationFile::brick(size_t i, DirectionSet directions) const {
   check(i < bricks_.size(), "brick number is in range");
   const BrickEntry& entry = bricks_[i];
   const glm::ivec3 position = hilbertPosition(entry.hilbertIndex, curveOrder_);
@@ -316,13 +429,65 @@ BrickView AttenuationFile::brick(size_t i) const {
   view.curve = hilbertCurve(state, brickOrder);
   view.steps = hilbertSteps(state, brickOrder);
   view.bytesPerCode = coding_.bytes();
-  view.codes = codes_.data() + i * codeBytes();
-  for (int k = 0; k < shared::kDirectionCount; ++k) {
-    const auto& planes = k < kDirectionsPerSection ? backward_ : forward_;
-    view.attenuations[k] = reinterpret_cast<const uint8_t*>(planes.data()) + i * attenuationBytes() +
-                           uint64_t(k % kDirectionsPerSection) * brickVoxels();
+  if (layout() == Layout::dense) {
+    viewMap(view, i);
+  } else {
+    unpack(view, i, directions);
   }
   return view;
+}
+
+void AttenuationFile::viewMap(BrickView& view, size_t i) const {
+  view.codes = stored(0, i).data();
+  for (size_t k = 0; k < shared::kDirectionCount; ++k) {
+    const auto* planes = reinterpret_cast<const uint8_t*>(stored(1 + k / kDirectionsPerSection, i).data());
+    view.attenuations[k] = planes + k % kDirectionsPerSection * brickVoxels();
+  }
+}
+
+void AttenuationFile::unpack(BrickView& view, size_t i, DirectionSet directions) const {
+  const auto expectSound = [&](const std::optional<std::string>& problem, size_t which) {
+    if (!problem) return;
+    const SectionEntry& section = required(brickSections()[which]);
+    throw InputError(fmt::format("{}: at byte {}: brick {} in section {}: {}", path_,
+                                 section.offset + storedOffset(which, i), i, text(section.type), *problem));
+  };
+  const size_t codeBytes = size_t(denseBytes(0));
+  const size_t planes = size_t(std::popcount(directions & kAllDirections));
+  view.unpacked = std::make_unique_for_overwrite<std::byte[]>(codeBytes + planes * size_t(brickVoxels()));
+  const std::span<std::byte> codes(view.unpacked.get(), codeBytes);
+  view.codes = codes.data();
+  expectSound(unpackCodes(stored(0, i), view.bytesPerCode, codes), 0);
+  if (const uint32_t largest = largestCode(codes, view.bytesPerCode); largest > coding_.largest) {
+    expectSound(fmt::format("expected codes up to {}, found {}", coding_.largest, largest), 0);
+  }
+  if ((directions & kAllDirections) == 0) return;
+
+  BrickRegeneration::Brick brick;
+  brick.codes = codes;
+  brick.bytesPerCode = view.bytesPerCode;
+  brick.hilbertState = hilbertState(view.origin / view.edge, curveOrder_);
+  brick.edge = view.edge;
+  brick.extent = brickExtent(view.origin / view.edge, dims(), view.edge);
+  std::array<uint8_t*, shared::kDirectionCount> targets{};
+  std::vector<uint8_t> faces;
+  auto* plane = reinterpret_cast<uint8_t*>(view.unpacked.get()) + codeBytes;
+  faces.resize(2 * passFaceBytes(view.edge));
+  for (int pass = 0; pass < 2; ++pass) {
+    constexpr DirectionSet kOfPass = (DirectionSet(1) << kDirectionsPerSection) - 1;
+    if ((directions >> (pass * kDirectionsPerSection) & kOfPass) == 0) continue;
+    const auto ofPass = std::span(faces).subspan(size_t(pass) * faces.size() / 2, faces.size() / 2);
+    expectSound(unpackFaces(stored(size_t(pass) + 1, i), pass, view.edge, ofPass), size_t(pass) + 1);
+    size_t at = 0;
+    for (int k = pass * kDirectionsPerSection; k < (pass + 1) * kDirectionsPerSection; ++k) {
+      brick.faces[size_t(k)] = ofPass.data() + at;
+      at += DirectionFaces(k, view.edge).bytes();
+      if ((directions >> k & 1) == 0) continue;
+      view.attenuations[k] = targets[size_t(k)] = plane;
+      plane += brickVoxels();
+    }
+  }
+  regeneration_->regenerate(brick, directions, targets);
 }
 
 std::optional<size_t> AttenuationFile::findBrick(glm::ivec3 brickPosition) const {
@@ -361,25 +526,26 @@ void AttenuationFile::verify() const {
     if (!holdsBrickData(entry.type)) verifySection(entry);
     end = entry.offset + entry.bytes;
   }
-  verifyHash(required(section::kCodes), brickSectionHash(bricks_, &BrickEntry::codesHash));
-  verifyHash(required(section::kBackward), brickSectionHash(bricks_, &BrickEntry::backwardHash));
-  verifyHash(required(section::kForward), brickSectionHash(bricks_, &BrickEntry::forwardHash));
+  for (size_t which = 0; which < kBrickHashes.size(); ++which)
+    verifyHash(required(brickSections()[which]), brickSectionHash(bricks_, kBrickHashes[which]));
   for (size_t i = 0; i < bricks_.size(); ++i)
     verifyBrick(i);
+  checkIntact();
 }
 
 void AttenuationFile::verifyBrick(size_t i) const {
   check(i < bricks_.size(), "brick number is in range");
-  const auto verifyPart = [&](SectionType type, uint64_t bytes, uint64_t expected) {
-    const SectionEntry& entry = required(type);
-    if (const uint64_t hash = contentHash(content(entry).subspan(i * bytes, bytes)); hash != expected) {
-      throw mismatch(path_, entry.offset + i * bytes, fmt::format("checksum of brick {} in section {}", i, text(type)),
+  for (size_t which = 0; which < kBrickHashes.size(); ++which) {
+    const uint64_t expected = bricks_[i].*kBrickHashes[which];
+    if (const uint64_t hash = contentHash(stored(which, i)); hash != expected) {
+      const SectionEntry& section = required(brickSections()[which]);
+      throw mismatch(path_, section.offset + storedOffset(which, i),
+                     fmt::format("checksum of brick {} in section {}", i, text(section.type)),
                      fmt::format("{:016x}", expected), fmt::format("{:016x}", hash));
     }
-  };
-  verifyPart(section::kCodes, codeBytes(), bricks_[i].codesHash);
-  verifyPart(section::kBackward, attenuationBytes(), bricks_[i].backwardHash);
-  verifyPart(section::kForward, attenuationBytes(), bricks_[i].forwardHash);
+  }
+  // Frames with the right checksum can still be no frames.
+  if (layout() == Layout::compact) brick(i);
 }
 
 }  // namespace freevoxel

@@ -1,8 +1,10 @@
 // The mapped reader of attenuation files.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -10,6 +12,7 @@
 
 #include "base/mapped_file.h"
 #include "base/placement.h"
+#include "hierarchy/brick_regeneration.h"
 #include "precompute/format.h"
 #include "precompute/hilbert.h"
 #include "volume/transfer_function.h"
@@ -17,9 +20,9 @@
 
 namespace freevoxel {
 
-/// One stored brick of the finest level: views into the map, valid as long as the AttenuationFile.
-/// Planes hold edge^3 entries in curve order (see `curve`). Voxels of the brick that lie outside the volume have code 0
-/// and attenuation 255 and must be skipped: origin + curve[i] >= dims.
+/// One stored brick of the finest level, valid as long as the AttenuationFile: views into the map (layout dense) or
+/// into memory of its own (compact). Move-only. Planes hold edge^3 entries in curve order (see `curve`). Voxels of the
+/// brick that lie outside the volume have code 0 and attenuation 255 and must be skipped: origin + curve[i] >= dims.
 struct BrickView {
   uint64_t hilbertIndex = 0;  ///< of the brick among bricks
   glm::ivec3 origin{0};       ///< its first voxel
@@ -28,8 +31,10 @@ struct BrickView {
   std::span<const LocalPosition> curve;  ///< step along the curve -> place in the brick
   std::span<const uint16_t> steps;       ///< local linear index (x fastest) -> step along the curve
   int bytesPerCode = 1;
-  const std::byte* codes = nullptr;      ///< value codes, 1 or 2 bytes each, little-endian
-  const uint8_t* attenuations[26] = {};  ///< per direction index: round(255 * A)
+  const std::byte* codes = nullptr;  ///< value codes, 1 or 2 bytes each, little-endian
+  /// Per direction index: round(255 * A), in layout compact off by one at most; null unless asked for.
+  const uint8_t* attenuations[26] = {};
+  std::unique_ptr<std::byte[]> unpacked;  ///< what the above point into, if not the map
 
   uint32_t code(size_t step) const {
     return bytesPerCode == 1 ? uint32_t(codes[step]) : uint32_t(codes[2 * step]) | uint32_t(codes[2 * step + 1]) << 8;
@@ -37,7 +42,8 @@ struct BrickView {
 };
 
 /// An attenuation file opened for reading. Everything but the payload is checked on open: every offset, size and count
-/// is known to lie inside the file before it is used. Move-only; const members may be called from many threads.
+/// is known to lie inside the file before it is used. A file that is cut meanwhile reads as zeros there: see
+/// checkIntact(). Move-only; const members may be called from many threads.
 class AttenuationFile {
  public:
   /// Throws InputError naming file, offset, what was expected and what was found.
@@ -57,14 +63,22 @@ class AttenuationFile {
   uint64_t visibleVoxels() const { return metadata_.visibleVoxels; }        ///< opacity > 0
   uint64_t nonFinite() const { return metadata_.nonFinite; }                ///< voxels that were NaN or infinite
   double largestValueError() const { return metadata_.largestValueError; }  ///< by coding values, data units
-  std::string command() const;  ///< that made the file; empty if not recorded
+  uint64_t codeBytes() const;         ///< that values take in the file, the directories left out
+  uint64_t attenuationBytes() const;  ///< that attenuation takes, as above
+  std::string command() const;        ///< that made the file; empty if not recorded
 
   size_t brickCount() const { return bricks_.size(); }  ///< stored bricks, sorted along the Hilbert curve
-  BrickView brick(size_t i) const;
+  glm::ivec3 brickOrigin(size_t i) const;               ///< its first voxel
+  /// Codes and the attenuation along `directions`. Layout compact unpacks them here, at a cost for every direction.
+  /// Throws InputError if that brick is damaged, which layout dense does not notice.
+  BrickView brick(size_t i, DirectionSet directions = kAllDirections) const;
   /// Position in brick() order of the brick at `brickPosition` (voxel / brickEdge), or nothing if it is not stored (or
   /// lies outside the volume).
   std::optional<size_t> findBrick(glm::ivec3 brickPosition) const;
 
+  /// Throws InputError if the file was cut or could not be read since it was opened. Whoever has used bricks calls it
+  /// before he relies on them.
+  void checkIntact() const { map_.checkIntact(); }
   /// Checks every checksum and every padding byte. Throws InputError naming the first damaged section and its offset.
   void verify() const;
   /// Checks one brick against its own checksums, which were checked on open. Throws InputError naming its offset.
@@ -83,11 +97,23 @@ class AttenuationFile {
   void readBricks();
   void verifyHash(const SectionEntry& entry, uint64_t hash) const;
   void verifySection(const SectionEntry& entry) const;
+  void readFrames();
+  /// Throws InputError naming the frame unless the frames of a section fill it.
+  void checkFrames(size_t which) const;
   void checkBrickSection(SectionType type, uint64_t bytesPerBrick) const;
 
+  /// The sections of codes, of directions 0..12 and of 13..25.
+  std::array<SectionType, 3> brickSections() const;
+  /// What section `which` of brickSections() holds of brick i.
+  std::span<const std::byte> stored(size_t which, size_t i) const;
+  uint64_t storedOffset(size_t which, size_t i) const;  ///< of the same, in the section
+  void viewMap(BrickView& view, size_t i) const;
+  void unpack(BrickView& view, size_t i, DirectionSet directions) const;
+
   uint64_t brickVoxels() const;
-  uint64_t codeBytes() const { return brickVoxels() * metadata_.codeBytes; }
-  uint64_t attenuationBytes() const { return brickVoxels() * kDirectionsPerSection; }
+  uint64_t denseBytes(size_t which) const {  ///< of a brick in section `which` of layout dense
+    return brickVoxels() * (which == 0 ? metadata_.codeBytes : uint64_t(kDirectionsPerSection));
+  }
 
   std::string path_;
   MappedFile map_;
@@ -96,9 +122,12 @@ class AttenuationFile {
   Placement placement_;
   ValueCoding coding_;
   TransferFunction transfer_;
-  int curveOrder_ = 0;                  ///< of the curve through the bricks
-  std::span<const BrickEntry> bricks_;  ///< in the map
-  std::span<const std::byte> codes_, backward_, forward_;
+  int curveOrder_ = 0;  ///< of the curve through the bricks
+  // Copies: what has been checked must not change with the file.
+  std::vector<BrickEntry> bricks_;
+  std::vector<FrameEntry> frames_;  ///< of layout compact
+  std::array<std::span<const std::byte>, 3> brickData_;
+  std::unique_ptr<const BrickRegeneration> regeneration_;  ///< of layout compact
 };
 
 }  // namespace freevoxel

@@ -3,40 +3,15 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
-#include <exception>
-#include <mutex>
 #include <utility>
 
+#include "base/first_exception.h"
 #include "base/grid.h"
-#include "precompute/checksums.h"
 #include "precompute/hilbert.h"
 
 namespace freevoxel {
 
 namespace {
-
-constexpr size_t kBricksPerCodeWrite = 16;
-
-/// Lets parallel loops end before the first of their exceptions goes on.
-class FirstException {
- public:
-  template <class F>
-  void guard(F&& f) noexcept {
-    try {
-      f();
-    } catch (...) {
-      const std::lock_guard lock(mutex_);
-      if (!first_) first_ = std::current_exception();
-    }
-  }
-  void rethrow() const {
-    if (first_) std::rethrow_exception(first_);
-  }
-
- private:
-  std::mutex mutex_;
-  std::exception_ptr first_;
-};
 
 /// Writes the part of a volume in x order that belongs to one brick into the brick's plane, edge^3 entries in curve
 /// order. `source`: the entry of the brick's first voxel, in an array of planes of dims.x * dims.y entries. `extent`:
@@ -57,10 +32,9 @@ void permuteBrick(const Source* source, glm::ivec3 dims, glm::ivec3 extent, int 
 
 }  // namespace
 
-BrickWriter::BrickWriter(AtomicFile& file, const BrickOffsets& offsets, std::span<const StoredBrick> bricks,
-                         glm::ivec3 dims, int edge, std::function<void(uint64_t)> advanced)
-    : file_(file),
-      offsets_(offsets),
+BrickWriter::BrickWriter(BrickStore& store, std::span<const StoredBrick> bricks, glm::ivec3 dims, int edge,
+                         std::function<void(uint64_t)> advanced)
+    : store_(store),
       bricks_(bricks),
       dims_(dims),
       edge_(edge),
@@ -69,7 +43,6 @@ BrickWriter::BrickWriter(AtomicFile& file, const BrickOffsets& offsets, std::spa
   const int order = brickCurveOrder(dims, edge);
   size_t largestSlab = 0;
   for (size_t i = 0; i < bricks.size(); ++i) {
-    entries_.push_back({bricks[i].hilbertIndex, bricks[i].visibleVoxels, 0, 0, 0, 0});
     steps_.push_back(hilbertSteps(hilbertState(bricks[i].position, order), std::countr_zero(unsigned(edge))));
     auto& slab = slabs_[size_t(bricks[i].position.z)];
     slab.push_back(i);
@@ -89,23 +62,21 @@ void BrickWriter::writeCodes(std::span<const uint16_t> codes, const ValueCoding&
 
 template <class Code>
 void BrickWriter::writeCodesAs(std::span<const uint16_t> codes) {
-  FirstException failure;
-#pragma omp parallel for schedule(dynamic)
-  for (size_t first = 0; first < bricks_.size(); first += kBricksPerCodeWrite) {
-    failure.guard([&] {
-      const size_t last = std::min(first + kBricksPerCodeWrite, bricks_.size());
-      std::vector<Code> planes((last - first) * brickVoxels());
-      for (size_t i = first; i < last; ++i) {
-        const glm::ivec3 extent = brickExtent(bricks_[i].position, dims_, edge_);
-        const std::span<Code> plane = std::span(planes).subspan((i - first) * brickVoxels(), brickVoxels());
-        permuteBrick(codes.data() + linearIndex(bricks_[i].position * edge_, dims_), dims_, extent, edge_, steps_[i],
-                     Code(0), plane.data());
-        entries_[i].codesHash = contentHash(std::as_bytes(plane));
-      }
-      file_.writeAt(offsets_.codes + first * brickVoxels() * sizeof(Code), std::as_bytes(std::span(planes)));
-    });
+  for (const std::vector<size_t>& slab : slabs_) {
+    FirstException failure;
+#pragma omp parallel for schedule(dynamic, 4)
+    for (size_t b = 0; b < slab.size(); ++b) {
+      failure.guard([&] {
+        const size_t i = slab[b];
+        std::vector<Code> plane(brickVoxels());
+        permuteBrick(codes.data() + linearIndex(bricks_[i].position * edge_, dims_), dims_,
+                     brickExtent(bricks_[i].position, dims_, edge_), edge_, steps_[i], Code(0), plane.data());
+        store_.codes(i, std::as_bytes(std::span(plane)));
+      });
+    }
+    failure.rethrow();
+    store_.endSlab();
   }
-  failure.rethrow();
 }
 
 void BrickWriter::receive(const AttenuationSlab& slab) {
@@ -126,18 +97,15 @@ void BrickWriter::complete(int pass, int firstPlane) {
   const auto start = std::chrono::steady_clock::now();
   const std::vector<size_t>& bricks = bricksAt(firstPlane);
   const uint64_t brickBytes = kDirectionsPerSection * brickVoxels();
-  const auto hash = pass == 0 ? &BrickEntry::backwardHash : &BrickEntry::forwardHash;
-  const uint64_t sectionOffset = pass == 0 ? offsets_.backward : offsets_.forward;
   FirstException failure;
 #pragma omp parallel for schedule(dynamic, 4)
   for (size_t b = 0; b < bricks.size(); ++b) {
     failure.guard([&] {
-      const auto bytes = std::as_bytes(std::span(planes_[size_t(pass)])).subspan(b * brickBytes, brickBytes);
-      entries_[bricks[b]].*hash = contentHash(bytes);
-      file_.writeAt(sectionOffset + bricks[b] * brickBytes, bytes);
+      store_.attenuation(pass, bricks[b], std::span(planes_[size_t(pass)]).subspan(b * brickBytes, brickBytes));
     });
   }
   failure.rethrow();
+  store_.endSlab();
   writeSeconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -1,4 +1,5 @@
-// Brick data on their way into the file: permuted to curve order, hashed and written, a slab of bricks at a time.
+// Brick data on their way into the file: permuted to curve order and handed to the layout's store, a slab of bricks at
+// a time.
 #pragma once
 
 #include <array>
@@ -8,40 +9,30 @@
 #include <span>
 #include <vector>
 
-#include "base/atomic_file.h"
-#include "precompute/format.h"
+#include "precompute/brick_store.h"
 #include "precompute/stored_bricks.h"
 #include "precompute/sweep.h"
 #include "volume/value_codes.h"
 
 namespace freevoxel {
 
-/// Where the first brick of each section lies in the file.
-struct BrickOffsets {
-  uint64_t codes = 0;
-  uint64_t backward = 0;
-  uint64_t forward = 0;
-};
-
-/// Writes the sections CODE, ATTB and ATTF, every byte of them once. Holds the attenuation of two slabs of bricks, 26
-/// bytes per voxel, so that the 13 planes of a brick go to the file in one piece.
+/// Gives a store codes and attenuation, every brick once. Holds the attenuation of two slabs of bricks, 26 bytes per
+/// voxel, so that the 13 planes of a brick go to the store in one piece.
 class BrickWriter final : public AttenuationSink {
  public:
   /// `bricks` in file order. `advanced`, from many threads at once, is told of every slab and direction how many voxels
   /// it has. All arguments must outlive the writer.
-  BrickWriter(AtomicFile& file, const BrickOffsets& offsets, std::span<const StoredBrick> bricks, glm::ivec3 dims,
-              int edge, std::function<void(uint64_t)> advanced);
+  BrickWriter(BrickStore& store, std::span<const StoredBrick> bricks, glm::ivec3 dims, int edge,
+              std::function<void(uint64_t)> advanced);
 
-  /// Section CODE. Throws MachineError.
+  /// The codes of all bricks, slab by slab. Throws MachineError.
   void writeCodes(std::span<const uint16_t> codes, const ValueCoding& coding);
 
   void receive(const AttenuationSlab& slab) override;
   /// Throws MachineError.
   void complete(int pass, int firstPlane) override;
 
-  /// The section BRIK; complete once all else is written.
-  std::span<const BrickEntry> entries() const { return entries_; }
-  /// Spent writing attenuation, by the clock.
+  /// Spent packing and writing attenuation, by the clock.
   double writeSeconds() const { return writeSeconds_; }
 
  private:
@@ -50,13 +41,11 @@ class BrickWriter final : public AttenuationSink {
   template <class Code>
   void writeCodesAs(std::span<const uint16_t> codes);
 
-  AtomicFile& file_;
-  BrickOffsets offsets_;
+  BrickStore& store_;
   std::span<const StoredBrick> bricks_;
   glm::ivec3 dims_;
   int edge_;
   std::function<void(uint64_t)> advanced_;
-  std::vector<BrickEntry> entries_;
   std::vector<std::span<const uint16_t>> steps_;           ///< hilbertSteps of each brick
   std::vector<std::vector<size_t>> slabs_;                 ///< bricks by their z, in file order
   std::array<std::vector<uint8_t>, kSweepPasses> planes_;  ///< of one slab of bricks: 13 planes each

@@ -15,7 +15,8 @@
 //             8      8  offset, a multiple of 8, and of 4096 for CODE, ATTB and ATTF
 //            16      8  bytes
 //            24      8  number of items
-//            32      8  XXH3-64 of the section's bytes; of CODE, ATTB and ATTF: of their hashes in BRIK, brick by brick
+//            32      8  XXH3-64 of the section's bytes; of those that hold bricks (CODE, ATTB, ATTF, ZCOD, ZFCB, ZFCF):
+//                       of their hashes in BRIK, brick by brick
 //             sections, none overlapping another, zeros between them; the file ends where the last one ends
 //
 //   type  items  what an item is
@@ -48,15 +49,26 @@
 //                       that holds the volume
 //             8      4  visible voxels in it
 //            12      4  zero
-//            16     24  XXH3-64 of the brick's bytes in CODE, in ATTB and in ATTF
+//            16     24  XXH3-64 of the brick's bytes in CODE, in ATTB and in ATTF; in ZCOD, in ZFCB and in ZFCF
+//   CMND  bytes  the command that made the file, UTF-8 text; may be skipped
+//
+// Layout dense has
 //   CODE  bricks value codes: E^3 of b bytes each along the Hilbert curve; 0 outside the volume
 //   ATTB  bricks 13 planes of E^3 bytes, directions 0..12: round(255 A) along the curve; 255 outside the volume
 //   ATTF  bricks 13 planes of E^3 bytes, directions 13..25
-//   CMND  bytes  the command that made the file, UTF-8 text; may be skipped
+// and layout compact
+//   FRAM  bricks where the frames of a brick lie, FrameEntry, in the order of BRIK
+//             0     24  offset in ZCOD, in ZFCB and in ZFCF, u64 each
+//            24     12  bytes in ZCOD, in ZFCB and in ZFCF, u32 each
+//            36      4  zero
+//   ZCOD  bricks frames (brick_frames.h) of value codes, as in CODE
+//   ZFCB  bricks frames of faces, directions 0..12: of ATTB the voxels from which one step leaves the brick
+//   ZFCF  bricks frames of faces, directions 13..25
 //
-// Bricks stand in CODE, ATTB and ATTF in the order of BRIK, so any one is found by multiplication, and checked without
-// reading the others: the header's hash covers that of BRIK, which covers those of the bricks. A brick is stored if one
-// of its voxels is a corner of a visible cell.
+// Bricks stand in CODE, ATTB and ATTF in the order of BRIK, so any one is found by multiplication. Frames fill ZCOD,
+// ZFCB and ZFCF without gap or overlap, in any order. Any brick is checked without reading the others: the header's
+// hash covers that of BRIK, which covers those of the bricks. A brick is stored if one of its voxels is a corner of a
+// visible cell.
 #pragma once
 
 #include <array>
@@ -120,6 +132,10 @@ inline constexpr SectionType kBricks = {'B', 'R', 'I', 'K'};
 inline constexpr SectionType kCodes = {'C', 'O', 'D', 'E'};
 inline constexpr SectionType kBackward = {'A', 'T', 'T', 'B'};
 inline constexpr SectionType kForward = {'A', 'T', 'T', 'F'};
+inline constexpr SectionType kFrames = {'F', 'R', 'A', 'M'};
+inline constexpr SectionType kPackedCodes = {'Z', 'C', 'O', 'D'};
+inline constexpr SectionType kPackedBackward = {'Z', 'F', 'C', 'B'};
+inline constexpr SectionType kPackedForward = {'Z', 'F', 'C', 'F'};
 inline constexpr SectionType kCommand = {'C', 'M', 'N', 'D'};
 }  // namespace section
 
@@ -194,6 +210,14 @@ struct BrickEntry {
 static_assert(sizeof(BrickEntry) == 40 && offsetof(BrickEntry, visibleVoxels) == 8 &&
               offsetof(BrickEntry, zero) == 12 && offsetof(BrickEntry, codesHash) == 16 &&
               offsetof(BrickEntry, backwardHash) == 24 && offsetof(BrickEntry, forwardHash) == 32);
+
+struct FrameEntry {
+  uint64_t offset[3];  ///< of codes, backward and forward faces, each in its section
+  uint32_t bytes[3];
+  uint32_t zero;
+};
+static_assert(sizeof(FrameEntry) == 40 && offsetof(FrameEntry, offset) == 0 && offsetof(FrameEntry, bytes) == 24 &&
+              offsetof(FrameEntry, zero) == 36);
 
 /// Brick edges that files may have: 4096-byte planes at 16; 32768 local positions, all that 16 bits hold, at 32.
 constexpr bool validBrickEdge(int64_t edge) {

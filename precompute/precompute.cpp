@@ -1,16 +1,21 @@
 #include "precompute/precompute.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
+#include <memory>
 #include <mutex>
 #include <new>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "base/grid.h"
+#include "precompute/brick_faces.h"
+#include "precompute/brick_store.h"
 #include "precompute/brick_writer.h"
 #include "precompute/checksums.h"
 #include "precompute/stored_bricks.h"
@@ -35,25 +40,22 @@ void checkOptions(const PrecomputeOptions& options, const std::string& path) {
   if (!validBrickEdge(options.brickEdge)) {
     throw InputError(fmt::format("{}: expected a brick edge of 8, 16 or 32 voxels, found {}", path, options.brickEdge));
   }
-  if (options.layout != Layout::dense) {
-    throw InputError(
-        fmt::format("{}: expected layout dense, found {}, which is not written yet", path, layoutName(options.layout)));
-  }
 }
 
 /// Where every section will lie. Hashes are filled in as the sections are written.
 class SectionPlan {
  public:
   void add(SectionType type, uint64_t items, uint64_t bytes, uint64_t alignment, uint32_t flags = 0) {
-    sections_.push_back({type, flags, alignment, bytes, items, 0});
+    sections_.push_back({type, flags, 0, bytes, items, 0});
+    alignments_.push_back(alignment);
   }
 
-  /// Call once, when all are added.
+  /// Call when all are added, and again when one has changed its size.
   void place() {
     uint64_t end = sizeof(FileHeader) + sections_.size() * sizeof(SectionEntry);
-    for (SectionEntry& entry : sections_) {
-      entry.offset = alignedUp(end, entry.offset);
-      end = entry.offset + entry.bytes;
+    for (size_t i = 0; i < sections_.size(); ++i) {
+      sections_[i].offset = alignedUp(end, alignments_[i]);
+      end = sections_[i].offset + sections_[i].bytes;
     }
     fileBytes_ = end;
   }
@@ -68,7 +70,8 @@ class SectionPlan {
   }
 
  private:
-  std::vector<SectionEntry> sections_;  ///< until place(), `offset` holds the alignment
+  std::vector<SectionEntry> sections_;
+  std::vector<uint64_t> alignments_;
   uint64_t fileBytes_ = 0;
 };
 
@@ -101,19 +104,35 @@ class SharedProgress {
   std::mutex mutex_;
 };
 
+/// The sections that hold bricks: of codes, of directions 0..12 and of 13..25.
+constexpr std::array<SectionType, 3> brickSections(Layout layout) {
+  if (layout == Layout::dense) return {section::kCodes, section::kBackward, section::kForward};
+  return {section::kPackedCodes, section::kPackedBackward, section::kPackedForward};
+}
+
+/// Frames are planned with the largest size they can have.
 SectionPlan planSections(const PrecomputeOptions& options, const ValueCoding& coding, uint64_t bricks,
                          const std::string& transferText) {
   const uint64_t brickVoxels = uint64_t(options.brickEdge) * uint64_t(options.brickEdge) * uint64_t(options.brickEdge);
-  const uint64_t attenuationBytes = bricks * brickVoxels * kDirectionsPerSection;
+  const uint64_t codeBytes = brickVoxels * uint64_t(coding.bytes());
   SectionPlan plan;
   plan.add(section::kMetadata, 1, sizeof(Metadata), kSectionAlignment);
   plan.add(section::kTransfer, transferText.size(), transferText.size(), kSectionAlignment);
   plan.add(section::kDirections, shared::kDirectionCount, 3 * shared::kDirectionCount, kSectionAlignment);
   plan.add(section::kCommand, options.command.size(), options.command.size(), kSectionAlignment, kSectionOptional);
   plan.add(section::kBricks, bricks, bricks * sizeof(BrickEntry), kSectionAlignment);
-  plan.add(section::kCodes, bricks, bricks * brickVoxels * uint64_t(coding.bytes()), kPageBytes);
-  plan.add(section::kBackward, bricks, attenuationBytes, kPageBytes);
-  plan.add(section::kForward, bricks, attenuationBytes, kPageBytes);
+  const auto [codes, backward, forward] = brickSections(options.layout);
+  if (options.layout == Layout::dense) {
+    plan.add(codes, bricks, bricks * codeBytes, kPageBytes);
+    plan.add(backward, bricks, bricks * brickVoxels * kDirectionsPerSection, kPageBytes);
+    plan.add(forward, bricks, bricks * brickVoxels * kDirectionsPerSection, kPageBytes);
+  } else {
+    const uint64_t faceBytes = largestFrame(passFaceBytes(options.brickEdge));
+    plan.add(section::kFrames, bricks, bricks * sizeof(FrameEntry), kSectionAlignment);
+    plan.add(codes, bricks, bricks * largestFrame(codeBytes), kSectionAlignment);
+    plan.add(backward, bricks, bricks * faceBytes, kSectionAlignment);
+    plan.add(forward, bricks, bricks * faceBytes, kSectionAlignment);
+  }
   plan.place();
   return plan;
 }
@@ -155,20 +174,13 @@ std::vector<int8_t> directionTable() {
   return table;
 }
 
-/// The file proper, given all that is known before the sweep. Adds its figures to `result`.
-void writeFile(const Volume& volume, const TransferFunction& transfer, std::span<const uint16_t> codes,
-               const ValueCoding& coding, std::span<const StoredBrick> bricks, const std::string& path,
+/// Sweeps, and gives `store` all bricks. Adds its figures to `result`.
+void fillStore(BrickStore& store, const Volume& volume, const TransferFunction& transfer,
+               std::span<const uint16_t> codes, const ValueCoding& coding, std::span<const StoredBrick> bricks,
                const PrecomputeOptions& options, Progress& progress, PrecomputeResult& result) {
-  const auto start = Clock::now();
-  const std::string transferText = transferFunctionJson(transfer);
-  SectionPlan plan = planSections(options, coding, bricks.size(), transferText);
-  AtomicFile file(path);
-  file.reserve(plan.fileBytes());
-
   SharedProgress sharedProgress(progress);
-  BrickWriter writer(
-      file, {plan[section::kCodes].offset, plan[section::kBackward].offset, plan[section::kForward].offset}, bricks,
-      volume.header.dims, options.brickEdge, [&](uint64_t voxels) { sharedProgress.advance(voxels); });
+  BrickWriter writer(store, bricks, volume.header.dims, options.brickEdge,
+                     [&](uint64_t voxels) { sharedProgress.advance(voxels); });
   writer.writeCodes(codes, coding);
   const auto segments = makeSegmentDepth(options.classification, transfer, coding);
   progress.begin("attenuation", volume.header.voxels() * shared::kDirectionCount, "voxels");
@@ -176,6 +188,48 @@ void writeFile(const Volume& volume, const TransferFunction& transfer, std::span
   sweepAttenuation(codes, volume.header.dims, *segments, options.brickEdge, writer);
   result.sweepSeconds = secondsSince(sweepStart) - writer.writeSeconds();
   progress.end();
+}
+
+/// Gives every section of frames the size it has become and moves it down to where the one before it ends.
+void closeGaps(AtomicFile& file, const CompactStore& store, SectionPlan& plan) {
+  const auto sections = brickSections(Layout::compact);
+  for (size_t which = 0; which < sections.size(); ++which) {
+    const CompactStore::Section& written = store.section(which);
+    plan[sections[which]].bytes = written.bytes;
+    plan.place();
+    const uint64_t end = plan[sections[which]].offset + written.bytes;
+    file.moveDown(written.offset, plan[sections[which]].offset, written.bytes);
+    // What lay there before must not show between the sections.
+    file.writeAt(end, std::vector<std::byte>(alignedUp(end, kSectionAlignment) - end));
+  }
+  file.truncate(plan.fileBytes());
+}
+
+/// The file proper, given all that is known before the sweep. Adds its figures to `result`.
+void writeFile(const Volume& volume, const TransferFunction& transfer, std::span<const uint16_t> codes,
+               const ValueCoding& coding, std::span<const StoredBrick> bricks, const std::string& path,
+               const PrecomputeOptions& options, Progress& progress, PrecomputeResult& result) {
+  const auto start = Clock::now();
+  const std::string transferText = transferFunctionJson(transfer);
+  SectionPlan plan = planSections(options, coding, bricks.size(), transferText);
+  const auto [codesType, backwardType, forwardType] = brickSections(options.layout);
+  AtomicFile file(path);
+  std::unique_ptr<BrickStore> store;
+  const CompactStore* compact = nullptr;
+  if (options.layout == Layout::dense) {
+    file.reserve(plan.fileBytes());
+    store = std::make_unique<DenseStore>(
+        file, DenseStore::Offsets{plan[codesType].offset, plan[backwardType].offset, plan[forwardType].offset}, bricks,
+        options.brickEdge, coding.bytes());
+  } else {
+    auto made = std::make_unique<CompactStore>(
+        file, std::array{plan[codesType].offset, plan[backwardType].offset, plan[forwardType].offset}, bricks,
+        volume.header.dims, options.brickEdge, coding.bytes());
+    compact = made.get();
+    store = std::move(made);
+  }
+  fillStore(*store, volume, transfer, codes, coding, bricks, options, progress, result);
+  if (compact != nullptr) closeGaps(file, *compact, plan);
 
   const auto writeSection = [&](SectionType type, std::span<const std::byte> bytes) {
     checkEqual(uint64_t(bytes.size()), plan[type].bytes, "bytes of a section");
@@ -188,12 +242,14 @@ void writeFile(const Volume& volume, const TransferFunction& transfer, std::span
   writeSection(section::kTransfer, std::as_bytes(std::span(transferText)));
   writeSection(section::kDirections, std::as_bytes(std::span(directions)));
   writeSection(section::kCommand, std::as_bytes(std::span(options.command)));
-  writeSection(section::kBricks, std::as_bytes(writer.entries()));
-  plan[section::kCodes].hash = brickSectionHash(writer.entries(), &BrickEntry::codesHash);
-  plan[section::kBackward].hash = brickSectionHash(writer.entries(), &BrickEntry::backwardHash);
-  plan[section::kForward].hash = brickSectionHash(writer.entries(), &BrickEntry::forwardHash);
+  writeSection(section::kBricks, std::as_bytes(store->entries()));
+  if (compact != nullptr) writeSection(section::kFrames, std::as_bytes(compact->frames()));
+  plan[codesType].hash = brickSectionHash(store->entries(), &BrickEntry::codesHash);
+  plan[backwardType].hash = brickSectionHash(store->entries(), &BrickEntry::backwardHash);
+  plan[forwardType].hash = brickSectionHash(store->entries(), &BrickEntry::forwardHash);
 
-  // The header comes last: without it nothing takes the file for an attenuation file.
+  // The header comes last, when all else is on the disk: without it nothing takes the file for an attenuation file.
+  file.sync();
   FileHeader header{kFileMagic, kFileVersion, uint32_t(plan.sections().size()), plan.fileBytes(), 0};
   header.hash = headerHash(header, plan.sections());
   file.writeAt(sizeof(FileHeader), std::as_bytes(plan.sections()));

@@ -4,6 +4,7 @@
 #include <glm/glm.hpp>
 
 #include "base/error.h"
+#include "base/first_exception.h"
 #include "splat/gradient.h"
 
 namespace freevoxel {
@@ -143,16 +144,24 @@ LightGrid lightGrid(const ValueGrid& grid, const VisibleCubes& cubes, const Atte
   }
   const Lamps lamps(grid, lighting, camera, attenuations, result);
   if (file != nullptr) {
-    const int64_t bricks = int64_t(file->brickCount());
-#pragma omp parallel for schedule(dynamic, 4)
-    for (int64_t b = 0; b < bricks; ++b) {
-      const BrickView brick = file->brick(size_t(b));
+    const auto lightBrick = [&](size_t b) {
+      DirectionSet directions = 0;
+      for (const LampAttenuation& attenuation : attenuations) {
+        if (attenuation.stored) directions |= attenuation.stored->directions(b);
+      }
+      const BrickView brick = file->brick(b, directions);
       std::vector<glm::ivec3> voxels;
       voxels.reserve(brick.curve.size());
       for (const LocalPosition& local : brick.curve)
         voxels.push_back(brick.origin + glm::ivec3(local.x, local.y, local.z));
       lamps.light(voxels, &brick);
-    }
+      file->checkIntact();
+    };
+    FirstException failure;
+#pragma omp parallel for schedule(dynamic, 4)
+    for (int64_t b = 0; b < int64_t(file->brickCount()); ++b)
+      failure.guard([&] { lightBrick(size_t(b)); });
+    failure.rethrow();
     return result;
   }
   constexpr int kEdge = 1 << VisibleCubes::kShift;

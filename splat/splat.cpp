@@ -139,7 +139,7 @@ struct Splatter::State {
 Splatter::Splatter(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer,
                    Backend backend)
     : state_(std::make_unique<State>(State{grid, file, transfer, {}, {}, {}, {}, nullptr, {}, {}})) {
-  if (file != nullptr && opacityHash(transfer) != opacityHash(file->transfer())) {
+  if (file != nullptr && !sameOpacity(transfer, file->transfer())) {
     throw InputError(fmt::format(
         "{}: made with other opacities than the transfer function given; run precompute again with it", file->path()));
   }

@@ -5,6 +5,7 @@
 #include <glm/glm.hpp>
 
 #include "base/error.h"
+#include "base/first_exception.h"
 #include "splat/direction_lookup.h"
 #include "splat/volume_view.h"
 
@@ -40,13 +41,21 @@ glm::ivec3 localPosition(const BrickView& brick, size_t step) {
   return {brick.curve[step].x, brick.curve[step].y, brick.curve[step].z};
 }
 
+DirectionSet directionsOf(const DirectionTriangle& triangle) {
+  DirectionSet set = 0;
+  for (const int direction : triangle.index)
+    set |= DirectionSet(1) << direction;
+  return set;
+}
+
 /// Powers within a brick differ so little beyond this distance that the table is linear to a thousandth of a code.
 constexpr double kNearBricks = 4.0;
 
 }  // namespace
 
 StoredAttenuation::StoredAttenuation(const AttenuationFile& file, const Towards& towards, StoredLookup lookup)
-    : towards_(towards),
+    : file_(file),
+      towards_(towards),
       lookup_(lookup),
       squaredLength_(glm::transpose(towards.lengthFromIndex) * towards.lengthFromIndex) {
   if (lookup != StoredLookup::quotient || !towards.inside(file.dims())) return;
@@ -59,6 +68,39 @@ StoredAttenuation::StoredAttenuation(const AttenuationFile& file, const Towards&
   atTarget_.emplace();
   for (size_t k = 0; k < atTarget_->size(); ++k)
     (*atTarget_)[k] = brick.attenuations[k][step];
+}
+
+int StoredAttenuation::nearest(glm::dvec3 voxel) const {
+  return nearestDirection(towards_.lengthFromIndex, towards_.lengthFromIndex * towards_.from(voxel));
+}
+
+DirectionSet StoredAttenuation::directions(size_t i) const {
+  if (file_.layout() == Layout::dense) return kAllDirections;  // they cost nothing there
+  const glm::ivec3 first = file_.brickOrigin(i), last = glm::min(first + file_.brickEdge(), file_.dims()) - 1;
+  const auto needed = [&](glm::dvec3 voxel) {
+    return lookup_ == StoredLookup::nearest ? DirectionSet(1) << nearest(voxel)
+                                            : directionsOf(directionTriangle(towards_.from(voxel)));
+  };
+  DirectionSet set = 0;
+  if (towards_.directional) return needed(glm::dvec3(first));
+  if (lookup_ != StoredLookup::nearest) {
+    // Octant triangles are convex: where all corners lie in one, so does what is between.
+    bool one = true;
+    for (int corner = 0; corner < 8; ++corner) {
+      const DirectionSet here =
+          needed({(corner & 1) ? last.x : first.x, (corner & 2) ? last.y : first.y, (corner & 4) ? last.z : first.z});
+      one = one && (set == 0 || set == here);
+      set |= here;
+    }
+    if (one) return set;
+  }
+  for (int z = first.z; z <= last.z; ++z) {
+    for (int y = first.y; y <= last.y; ++y) {
+      for (int x = first.x; x <= last.x; ++x)
+        set |= needed(glm::dvec3(x, y, z));
+    }
+  }
+  return set;
 }
 
 void StoredAttenuation::look(const BrickView& brick, std::span<float> attenuation) const {
@@ -111,9 +153,8 @@ void StoredAttenuation::look(const BrickView& brick, std::span<float> attenuatio
 
 void StoredAttenuation::lookNearest(const BrickView& brick, std::span<float> attenuation) const {
   for (size_t step = 0; step < attenuation.size(); ++step) {
-    const glm::dvec3 u = towards_.from(glm::dvec3(brick.origin + localPosition(brick, step)));
-    const int nearest = nearestDirection(towards_.lengthFromIndex, towards_.lengthFromIndex * u);
-    attenuation[step] = float(brick.attenuations[nearest][step]) * (1.0f / 255.0f);
+    const int direction = nearest(glm::dvec3(brick.origin + localPosition(brick, step)));
+    attenuation[step] = float(brick.attenuations[direction][step]) * (1.0f / 255.0f);
   }
 }
 
@@ -153,22 +194,22 @@ AttenuationGrid storedAttenuation(const AttenuationFile& file, const Towards& to
   const StoredAttenuation stored(file, towards, lookup);
   AttenuationGrid result;
   result.values.assign(voxelCount(dims), uint16_t(AttenuationGrid::kUnit));
-  const int64_t bricks = int64_t(file.brickCount());
-#pragma omp parallel
-  {
-    std::vector<float> attenuation;
-#pragma omp for schedule(dynamic, 4)
-    for (int64_t b = 0; b < bricks; ++b) {
-      const BrickView brick = file.brick(size_t(b));
-      attenuation.resize(brick.curve.size());
-      stored.look(brick, attenuation);
-      for (size_t step = 0; step < attenuation.size(); ++step) {
-        const glm::ivec3 p = brick.origin + localPosition(brick, step);
-        if (p.x >= dims.x || p.y >= dims.y || p.z >= dims.z) continue;
-        result.values[linearIndex(p, dims)] = uint16_t(attenuation[step] * AttenuationGrid::kUnit + 0.5f);
-      }
+  const auto lookUpBrick = [&](size_t b) {
+    const BrickView brick = file.brick(b, stored.directions(b));
+    std::vector<float> attenuation(brick.curve.size());
+    stored.look(brick, attenuation);
+    for (size_t step = 0; step < attenuation.size(); ++step) {
+      const glm::ivec3 p = brick.origin + localPosition(brick, step);
+      if (p.x >= dims.x || p.y >= dims.y || p.z >= dims.z) continue;
+      result.values[linearIndex(p, dims)] = uint16_t(attenuation[step] * AttenuationGrid::kUnit + 0.5f);
     }
-  }
+    file.checkIntact();
+  };
+  FirstException failure;
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int64_t b = 0; b < int64_t(file.brickCount()); ++b)
+    failure.guard([&] { lookUpBrick(size_t(b)); });
+  failure.rethrow();
   return result;
 }
 

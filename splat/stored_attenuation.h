@@ -23,6 +23,9 @@ class StoredAttenuation {
   /// `file` must outlive this.
   StoredAttenuation(const AttenuationFile& file, const Towards& towards, StoredLookup lookup);
 
+  /// The stored directions that `look` needs of brick i.
+  DirectionSet directions(size_t i) const;
+
   /// Attenuation, 0..1, at every step along the brick's curve; edge^3 entries. Voxels outside the volume get any number
   /// in that range. May be called from many threads.
   void look(const BrickView& brick, std::span<float> attenuation) const;
@@ -30,8 +33,10 @@ class StoredAttenuation {
  private:
   void lookNearest(const BrickView& brick, std::span<float> attenuation) const;
   void lookOneByOne(const BrickView& brick, std::span<float> attenuation) const;
+  int nearest(glm::dvec3 voxel) const;
   float divisor(glm::dvec3 towardsTarget) const;
 
+  const AttenuationFile& file_;
   Towards towards_;
   StoredLookup lookup_;
   glm::dmat3 squaredLength_;  ///< u . (squaredLength_ u) is the squared length of u

@@ -4,6 +4,7 @@
 #include <glm/common.hpp>
 
 #include "base/error.h"
+#include "base/first_exception.h"
 
 namespace freevoxel {
 
@@ -68,17 +69,25 @@ ValueGrid valueGrid(const AttenuationFile& file) {
   const glm::ivec3 bricks = (grid.dims + (edge - 1)) / edge;
   std::vector<uint8_t> known(voxelCount(bricks), 0);
   const int64_t count = int64_t(file.brickCount());
-#pragma omp parallel for schedule(dynamic, 8)
-  for (int64_t b = 0; b < count; ++b) {
-    const BrickView brick = file.brick(size_t(b));
+  const auto copyBrick = [&](size_t b) {
+    const BrickView brick = file.brick(b, DirectionSet(0));
     known[linearIndex(brick.origin / edge, bricks)] = 1;
     for (size_t step = 0; step < brick.curve.size(); ++step) {
       const glm::ivec3 p = brick.origin + glm::ivec3(brick.curve[step].x, brick.curve[step].y, brick.curve[step].z);
       if (p.x < grid.dims.x && p.y < grid.dims.y && p.z < grid.dims.z) {
-        grid.codes[linearIndex(p, grid.dims)] = uint16_t(brick.code(step));
+        // A damaged file may hold codes beyond the tables made for them.
+        grid.codes[linearIndex(p, grid.dims)] = uint16_t(std::min(brick.code(step), grid.coding.largest));
       }
     }
-  }
+  };
+  FirstException failure;
+#pragma omp parallel for schedule(dynamic, 8)
+  for (int64_t b = 0; b < count; ++b)
+    failure.guard([&] {
+      copyBrick(size_t(b));
+      file.checkIntact();
+    });
+  failure.rethrow();
   fillAbsentBricks(grid, std::move(known), bricks, edge);
   return grid;
 }

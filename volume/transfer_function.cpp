@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "base/error.h"
 #include "base/image.h"
@@ -107,6 +108,24 @@ uint64_t opacityHash(const TransferFunction& transfer) {
   for (double& figure : figures)
     figure += 0.0;  // -0 and 0 are one number
   return XXH3_64bits(figures.data(), figures.size() * sizeof(double));
+}
+
+bool sameOpacity(const TransferFunction& a, const TransferFunction& b) {
+  if (a.low != b.low || a.high != b.high || a.referenceLength != b.referenceLength || a.isLabels != b.isLabels) {
+    return false;
+  }
+  std::vector<double> corners{a.low, a.high};
+  for (const TransferFunction* transfer : {&a, &b}) {
+    for (const TransferPoint& point : transfer->points)
+      corners.push_back(point.value);
+  }
+  // Linear in between, so it is enough to look at both sides of every corner.
+  return std::all_of(corners.begin(), corners.end(), [&](double corner) {
+    constexpr double kTolerance = 1e-12;
+    const double below = std::nextafter(corner, -std::numeric_limits<double>::infinity());
+    return std::abs(a.opacityAt(corner) - b.opacityAt(corner)) <= kTolerance &&
+           std::abs(a.opacityAt(below) - b.opacityAt(below)) <= kTolerance;
+  });
 }
 
 std::vector<Classified> transferTable(const TransferFunction& transfer, size_t size) {

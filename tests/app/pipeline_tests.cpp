@@ -230,7 +230,40 @@ TEST_F(Pipeline, transferFunctionsOfOtherOpacityAreRefused) {
   std::string recoloured = kTransfer;
   recoloured.replace(recoloured.find("[1.0, 1.0, 0.9]"), 15, "[0.0, 1.0, 0.0]");
   writeBytes(folder + "/recoloured.json", recoloured);
-  run(std::string("render cloud.fvx --transfer recoloured.json -o a.png") + kView);
+  run(std::string("render cloud.fvx -o a.exr") + kView);
+  run(std::string("render cloud.fvx --transfer recoloured.json -o b.exr") + kView);
+  const Image before = readImage(folder + "/a.exr"), after = readImage(folder + "/b.exr");
+  double red[2] = {}, alphaChange = 0.0;
+  for (size_t i = 0; i < before.pixels.size(); i += 4) {
+    red[0] += before.pixels[i];
+    red[1] += after.pixels[i];
+    alphaChange = std::max(alphaChange, double(std::abs(before.pixels[i + 3] - after.pixels[i + 3])));
+  }
+  EXPECT_LT(red[1], 0.9 * red[0]) << "the new colours are used";
+  EXPECT_EQ(alphaChange, 0.0);
+  // A colour picked half-way, on the line of opacities that was there.
+  recoloured.replace(recoloured.find("{\"value\": 255"), 0,
+                     R"({"value": 147.5, "color": [0.2, 0.9, 0.1], "opacity": 0.35}, )");
+  writeBytes(folder + "/recoloured.json", recoloured);
+  run(std::string("render cloud.fvx --transfer recoloured.json -o b.exr") + kView);
+}
+
+TEST_F(Pipeline, layoutsGiveNearlyTheSamePicture) {
+  for (const std::string edge : {"16", "32"}) {
+    run("precompute cloud.nrrd --transfer t.json --layout compact --brick " + edge + " -o compact.fvx");
+    run("verify compact.fvx");
+    const auto json = nlohmann::json::parse(run("info compact.fvx --json").output);
+    EXPECT_EQ(json["layout"], "compact");
+    EXPECT_EQ(json["occupancy"], 1.0);
+    EXPECT_LT(json["attenuationBytes"], 385 * 26);
+    EXPECT_EQ(json["attenuationBytesPerVoxel"], json["attenuationBytes"].get<double>() / 385);
+    EXPECT_EQ(json["valueBytesPerStoredVoxel"], json["valueBytes"].get<double>() / 385);
+    for (const std::string options : {"--formula direct", "--formula paper", "--light-direction 1,2,3"}) {
+      run("render cloud.fvx " + options + kView + "-o a.exr");
+      run("render compact.fvx " + options + kView + "-o b.exr");
+      run("compare a.exr b.exr --min-psnr 50");
+    }
+  }
 }
 
 TEST_F(Pipeline, quietSaysNothing) {

@@ -1,12 +1,16 @@
 // Files that are cut short, damaged or made to mislead: all are refused with one line, none is read out of bounds.
 #include <gtest/gtest.h>
+#include <zstd.h>
 
+#include <algorithm>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "base/error.h"
@@ -19,26 +23,25 @@
 namespace freevoxel {
 namespace {
 
+std::string makeFile(glm::ivec3 dims, uint32_t seed, Layout layout) {
+  const std::string path = test::temporaryFolder() + "/made.fvx";
+  precompute(test::randomBytes(dims, seed), test::veilAndRamp(), path,
+             {Classification::voxel, layout, 8, "made by a test"}, test::silentProgress());
+  return test::readBytes(path);
+}
+
 /// A valid file of one brick; small, since the tests below read it once for every byte.
-const std::string& oneBrick() {
-  static const std::string kBytes = [] {
-    const std::string path = test::temporaryFolder() + "/one.fvx";
-    precompute(test::randomBytes({5, 7, 6}, 41), test::veilAndRamp(), path,
-               {Classification::voxel, Layout::dense, 8, "made by a test"}, test::silentProgress());
-    return test::readBytes(path);
-  }();
-  return kBytes;
+const std::string& oneBrick(Layout layout = Layout::dense) {
+  static const std::string kDense = makeFile({5, 7, 6}, 41, Layout::dense);
+  static const std::string kCompact = makeFile({5, 7, 6}, 41, Layout::compact);
+  return layout == Layout::dense ? kDense : kCompact;
 }
 
 /// A valid file of several bricks in a box that leaves much of its cube empty.
-const std::string& manyBricks() {
-  static const std::string kBytes = [] {
-    const std::string path = test::temporaryFolder() + "/many.fvx";
-    precompute(test::randomBytes({9, 33, 20}, 42), test::veilAndRamp(), path,
-               {Classification::voxel, Layout::dense, 8, "made by a test"}, test::silentProgress());
-    return test::readBytes(path);
-  }();
-  return kBytes;
+const std::string& manyBricks(Layout layout = Layout::dense) {
+  static const std::string kDense = makeFile({9, 33, 20}, 42, Layout::dense);
+  static const std::string kCompact = makeFile({9, 33, 20}, 42, Layout::compact);
+  return layout == Layout::dense ? kDense : kCompact;
 }
 
 /// The message of the InputError that opening and verifying throws; empty if there is none.
@@ -53,19 +56,24 @@ std::string complaint(const std::string& path) {
   }
 }
 
-TEST(DamagedFile, everyTruncationIsFound) {
+class DamagedFile : public testing::TestWithParam<Layout> {};
+INSTANTIATE_TEST_SUITE_P(Layouts, DamagedFile, testing::Values(Layout::dense, Layout::compact),
+                         [](const auto& tested) { return std::string(layoutName(tested.param)); });
+
+TEST_P(DamagedFile, everyTruncationIsFound) {
   const std::string path = test::temporaryFolder() + "/cut.fvx";
-  test::writeBytes(path, oneBrick());
+  const std::string& whole = oneBrick(GetParam());
+  test::writeBytes(path, whole);
   ASSERT_EQ(complaint(path), "");
-  for (size_t bytes = oneBrick().size(); bytes-- > 0;) {
+  for (size_t bytes = whole.size(); bytes-- > 0;) {
     std::filesystem::resize_file(path, bytes);
     ASSERT_NE(complaint(path), "") << bytes;
   }
 }
 
-TEST(DamagedFile, everyChangedByteIsFound) {
+TEST_P(DamagedFile, everyChangedByteIsFound) {
   const std::string path = test::temporaryFolder() + "/flipped.fvx";
-  std::string bytes = oneBrick();
+  const std::string& bytes = oneBrick(GetParam());
   test::writeBytes(path, bytes);
   std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
   const auto put = [&](size_t at, char byte) { file.seekp(std::streamoff(at)).put(byte).flush(); };
@@ -79,13 +87,36 @@ TEST(DamagedFile, everyChangedByteIsFound) {
   EXPECT_EQ(complaint(path), "");
 }
 
-TEST(DamagedFile, bytesAfterTheEndAreFound) {
+/// Cut after it was opened: to nothing, in the middle, in its last page.
+TEST_P(DamagedFile, cutWhileItIsMappedIsFound) {
+  const std::string path = test::temporaryFolder() + "/cut.fvx";
+  const std::string& whole = manyBricks(GetParam());
+  for (const size_t bytes : {size_t(0), whole.size() / 2, whole.size() - 1}) {
+    test::writeBytes(path, whole);
+    const AttenuationFile file(path);
+    file.checkIntact();
+    std::filesystem::resize_file(path, bytes);
+    [[maybe_unused]] volatile uint32_t seen = 0;  // so that every byte is read
+    for (size_t i = 0; i < file.brickCount(); ++i) {
+      try {
+        const BrickView brick = file.brick(i);
+        for (size_t step = 0; step < brick.curve.size(); ++step)
+          seen = brick.code(step) + brick.attenuations[0][step] + brick.attenuations[25][step];
+      } catch (const InputError&) {  // zeros are no frame
+      }
+    }
+    EXPECT_THROW(file.checkIntact(), InputError);
+    EXPECT_THROW(file.verify(), InputError);
+  }
+}
+
+TEST(DamagedFiles, bytesAfterTheEndAreFound) {
   const std::string path = test::temporaryFolder() + "/long.fvx";
   test::writeBytes(path, oneBrick() + std::string(1, '\0'));
   EXPECT_NE(complaint(path).find("bytes in the file"), std::string::npos);
 }
 
-TEST(DamagedFile, otherFilesAreRefused) {
+TEST(DamagedFiles, otherFilesAreRefused) {
   const std::string folder = test::temporaryFolder();
   for (const std::string& bytes : {std::string(), std::string("NRRD0004\n"), std::string(5000, '\0'),
                                    std::string("\x89"
@@ -136,8 +167,11 @@ class Forgery {
       const size_t offset = sizeof(FileHeader) + i * sizeof(SectionEntry);
       SectionEntry entry = at<SectionEntry>(offset);
       const bool inside = entry.offset <= bytes.size() && entry.bytes <= bytes.size() - entry.offset;
-      // The others have hashes of the hashes in BRIK.
-      if (inside && entry.offset % kPageBytes != 0) {
+      const std::string type(entry.type.data(), entry.type.size());
+      constexpr const char* kOfBricks[] = {"CODE", "ATTB", "ATTF", "ZCOD", "ZFCB", "ZFCF"};
+      const bool ofBricks = std::find(std::begin(kOfBricks), std::end(kOfBricks), type) != std::end(kOfBricks);
+      // Those have hashes of the hashes in BRIK.
+      if (inside && !ofBricks) {
         entry.hash = contentHash(std::as_bytes(std::span(bytes)).subspan(entry.offset, entry.bytes));
       }
       set(offset, entry);
@@ -157,7 +191,8 @@ std::string complaintOf(const Forgery& forgery) {
 }
 
 TEST(ForgedFile, sealedWithoutChangeIsAccepted) {
-  for (const std::string* original : {&oneBrick(), &manyBricks()}) {
+  for (const std::string* original :
+       {&oneBrick(), &manyBricks(), &oneBrick(Layout::compact), &manyBricks(Layout::compact)}) {
     Forgery forgery(*original);
     forgery.seal();
     EXPECT_EQ(forgery.bytes, *original);
@@ -276,7 +311,8 @@ TEST(ForgedFile, metadata) {
   expectRefused("bytes per code", offsetof(Metadata, codeLargest), uint32_t(256));
   expectRefused("bytes per code", offsetof(Metadata, codeBytes), uint32_t(0));
   expectRefused("classification", offsetof(Metadata, classification), uint32_t(2));
-  expectRefused("layout", offsetof(Metadata, layout), uint32_t(1));
+  expectRefused("layout", offsetof(Metadata, layout), uint32_t(2));
+  expectRefused("a section ZCOD, found none", offsetof(Metadata, layout), uint32_t(1));
   expectRefused("levels", offsetof(Metadata, levels), uint32_t(2));
   expectRefused("reserved", offsetof(Metadata, zero0), uint32_t(1));
   expectRefused("reserved", offsetof(Metadata, zero1), uint64_t(1));
@@ -319,6 +355,179 @@ TEST(ForgedFile, brickDirectory) {
   for (const size_t field : {16, 24, 32}) {
     expectRefused("checksum of section", [&](Forgery& f, size_t at) { f.set<uint64_t>(at + field, 1); });
   }
+}
+
+/// A compact file whose frames can be exchanged.
+class CompactForgery : public Forgery {
+ public:
+  CompactForgery() : Forgery(manyBricks(Layout::compact)) {}
+
+  size_t frameEntry(size_t brick) const { return sectionOffset("FRAM") + brick * sizeof(FrameEntry); }
+  size_t frameOffset(size_t which, size_t brick) const {
+    constexpr const char* kSections[] = {"ZCOD", "ZFCB", "ZFCF"};
+    return sectionOffset(kSections[which]) + at<FrameEntry>(frameEntry(brick)).offset[which];
+  }
+  size_t frameBytes(size_t which, size_t brick) const { return at<FrameEntry>(frameEntry(brick)).bytes[which]; }
+
+  /// Puts `frame` in the place of one of the last section, ZFCF, which may grow. Every checksum fits afterwards.
+  void replaceLast(size_t brick, const std::string& frame) {
+    const size_t old = frameBytes(2, brick);
+    bytes.replace(frameOffset(2, brick), old, frame);
+    const uint64_t from = at<FrameEntry>(frameEntry(brick)).offset[2];
+    const auto count = at<SectionEntry>(entryOffset("BRIK")).items;
+    for (size_t i = 0; i < count; ++i) {
+      auto entry = at<FrameEntry>(frameEntry(i));
+      if (entry.offset[2] > from) entry.offset[2] += frame.size() - old;
+      if (i == brick) entry.bytes[2] = uint32_t(frame.size());
+      set(frameEntry(i), entry);
+    }
+    auto section = at<SectionEntry>(entryOffset("ZFCF"));
+    section.bytes += frame.size() - old;
+    set(entryOffset("ZFCF"), section);
+    set<uint64_t>(offsetof(FileHeader, fileBytes), bytes.size());
+    hashBricks();
+  }
+
+  /// Makes the hashes of bricks and of the sections that hold them fit.
+  void hashBricks() {
+    const auto count = at<SectionEntry>(entryOffset("BRIK")).items;
+    constexpr const char* kSections[] = {"ZCOD", "ZFCB", "ZFCF"};
+    for (size_t which = 0; which < 3; ++which) {
+      std::vector<uint64_t> hashes;
+      for (size_t i = 0; i < count; ++i) {
+        const auto frame = std::as_bytes(std::span(bytes)).subspan(frameOffset(which, i), frameBytes(which, i));
+        hashes.push_back(contentHash(frame));
+        set(sectionOffset("BRIK") + i * sizeof(BrickEntry) + 16 + 8 * which, hashes.back());
+      }
+      auto section = at<SectionEntry>(entryOffset(kSections[which]));
+      section.hash = contentHash(std::as_bytes(std::span(hashes)));
+      set(entryOffset(kSections[which]), section);
+    }
+    seal();
+  }
+};
+
+/// A frame that holds `contents`.
+std::string frameOf(const std::string& contents, uint8_t prediction = 0) {
+  std::string frame(1 + ZSTD_compressBound(contents.size()), char(prediction));
+  frame.resize(1 + ZSTD_compress(frame.data() + 1, frame.size() - 1, contents.data(), contents.size(), 1));
+  return frame;
+}
+
+constexpr size_t kFaceBytes = 1588;  // of a pass at edge 8
+
+TEST(ForgedFile, framesThatAreWhatTheySayAreAccepted) {
+  for (const uint8_t prediction : {0, 1}) {
+    CompactForgery forgery;
+    forgery.replaceLast(1, frameOf(std::string(kFaceBytes, char(200)), prediction));
+    EXPECT_EQ(complaintOf(forgery), "");
+  }
+}
+
+TEST(ForgedFile, framesThatLie) {
+  const auto expectRefused = [](const char* what, const std::string& frame) {
+    CompactForgery forgery;
+    forgery.replaceLast(1, frame);
+    const std::string found = complaintOf(forgery);
+    EXPECT_NE(found.find(what), std::string::npos) << what << ": " << found;
+    EXPECT_NE(found.find("brick 1 in section ZFCF"), std::string::npos) << found;
+  };
+  const std::string right = frameOf(std::string(kFaceBytes, char(200)));
+  expectRefused("expected a frame of 1588 bytes, found 1587", frameOf(std::string(kFaceBytes - 1, char(200))));
+  expectRefused("expected a frame of 1588 bytes, found 1589", frameOf(std::string(kFaceBytes + 1, char(200))));
+  expectRefused("expected a frame of 1588 bytes, found 0", frameOf(""));
+  // 256 MiB in a few kilobytes.
+  expectRefused("expected a frame of 1588 bytes, found 268435456", frameOf(std::string(size_t(1) << 28, '\0')));
+  expectRefused("prediction", '\2' + right.substr(1));
+  expectRefused("one zstd frame", right + std::string(1, '\0'));
+  expectRefused("one zstd frame", right + right.substr(1));
+  expectRefused("one zstd frame", right.substr(0, right.size() - 1));
+  expectRefused("expected a frame, found 1 bytes", right.substr(0, 1));
+  expectRefused("a zstd frame that knows its size", '\0' + std::string("no frame at all"));
+  std::string lying = right;  // the size of contents stands in bytes 6 and 7, less 256
+  ASSERT_EQ(uint8_t(lying[6]) + 256 * uint8_t(lying[7]) + 256, int(kFaceBytes));
+  lying[6] = char(uint8_t(lying[6]) + 1);
+  expectRefused("expected a frame of 1588 bytes, found 1589", lying);
+  std::string longer = frameOf(std::string(kFaceBytes + 1, char(200)));  // and one that says less than it holds
+  longer[6] = char(uint8_t(longer[6]) - 1);
+  expectRefused("damaged zstd frame", longer);
+}
+
+TEST(ForgedFile, frameDirectory) {
+  const auto expectRefused = [](const char* what, const std::function<void(FrameEntry&, FrameEntry&)>& change) {
+    CompactForgery forgery;
+    auto first = forgery.at<FrameEntry>(forgery.frameEntry(0)), second = forgery.at<FrameEntry>(forgery.frameEntry(1));
+    change(first, second);
+    forgery.set(forgery.frameEntry(0), first);
+    forgery.set(forgery.frameEntry(1), second);
+    forgery.seal();
+    EXPECT_NE(complaintOf(forgery).find(what), std::string::npos) << what << ": " << complaintOf(forgery);
+  };
+  constexpr uint64_t kHuge = ~uint64_t(0);
+  for (size_t which = 0; which < 3; ++which) {
+    expectRefused("offset of brick", [&](FrameEntry& a, FrameEntry&) { a.offset[which] += 1; });
+    expectRefused("offset of brick", [&](FrameEntry& a, FrameEntry&) { a.offset[which] = kHuge; });
+    expectRefused("offset of brick", [&](FrameEntry& a, FrameEntry& b) { a.offset[which] = b.offset[which]; });
+    expectRefused("offset of brick", [&](FrameEntry& a, FrameEntry&) { a.bytes[which] -= 1; });
+    expectRefused("of brick", [&](FrameEntry& a, FrameEntry&) { a.bytes[which] = 0xffffffffu; });
+    expectRefused("of brick", [&](FrameEntry&, FrameEntry& b) { b.bytes[which] = 0; });
+  }
+  expectRefused("reserved", [](FrameEntry& a, FrameEntry&) { a.zero = 1; });
+  // Frames may lie in any order, but then the hashes of bricks are wrong.
+  expectRefused("checksum of brick 0", [](FrameEntry& a, FrameEntry& b) { std::swap(a, b); });
+}
+
+TEST(ForgedFile, compactSections) {
+  for (const char* needed : {"FRAM", "ZCOD", "ZFCB", "ZFCF"}) {
+    CompactForgery without;
+    const size_t entry = without.entryOffset(needed);
+    without.bytes.replace(entry, 4, "GONE");
+    without.set<uint32_t>(entry + 4, kSectionOptional);
+    without.seal();
+    EXPECT_NE(complaintOf(without).find(needed), std::string::npos);
+    CompactForgery miscounted;
+    miscounted.set<uint64_t>(miscounted.entryOffset(needed) + offsetof(SectionEntry, items), 1);
+    miscounted.seal();
+    EXPECT_NE(complaintOf(miscounted).find(needed), std::string::npos) << complaintOf(miscounted);
+  }
+  CompactForgery dense;
+  dense.set(dense.sectionOffset("META") + offsetof(Metadata, layout), uint32_t(0));
+  dense.seal();
+  EXPECT_NE(complaintOf(dense).find("a section CODE, found none"), std::string::npos);
+}
+
+/// A brick is damaged under a checksum that fits: whoever unpacks it is told, whatever he asks for.
+TEST(ForgedFile, unpackingTellsOfDamage) {
+  CompactForgery forgery;
+  forgery.replaceLast(1, frameOf(std::string(kFaceBytes - 1, char(200))));
+  const std::string path = test::temporaryFolder() + "/brick.fvx";
+  test::writeBytes(path, forgery.bytes);
+  const AttenuationFile file(path);
+  file.brick(0);
+  file.brick(1, DirectionSet(0));
+  file.brick(1, DirectionSet(1) << 3);
+  EXPECT_THROW(file.brick(1, DirectionSet(1) << 13), InputError);
+  EXPECT_THROW(file.brick(1), InputError);
+}
+
+/// Damage that no checksum covers while bricks are read: an error, or some bytes, and never anything out of bounds.
+TEST(DamagedFiles, changedFramesAreReadWithoutHarm) {
+  const std::string path = test::temporaryFolder() + "/flipped.fvx";
+  const std::string& bytes = oneBrick(Layout::compact);
+  const size_t first = Forgery(bytes).sectionOffset("ZCOD");
+  size_t refused = 0;
+  for (size_t at = first; at < bytes.size(); ++at) {
+    std::string changed = bytes;
+    changed[at] = char(changed[at] ^ (1 << at % 8));
+    test::writeBytes(path, changed);
+    try {
+      const AttenuationFile file(path);
+      file.brick(0);
+    } catch (const InputError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 0u);
 }
 
 TEST(ForgedFile, paddingIsCheckedByVerify) {

@@ -21,6 +21,32 @@ TransferFunction exampleTransfer() {
   return transfer;
 }
 
+TEST(TransferFunction, sameOpacityIsThatOfTheFunctionNotOfItsPoints) {
+  TransferFunction one;
+  one.points = {{20.0, glm::dvec3(1.0), 0.0}, {100.0, glm::dvec3(1.0), 0.3}, {100.0, {}, 0.5}, {200.0, {}, 0.1}};
+  TransferFunction other = one;
+  other.points[1].srgb = glm::dvec3(0.2);
+  other.points.insert(other.points.begin() + 1, {60.0, {}, 0.15});
+  other.points.push_back({230.0, {}, 0.1});
+  EXPECT_TRUE(sameOpacity(one, other));
+  EXPECT_TRUE(sameOpacity(other, one));
+  const auto expectDifferent = [&](auto&& change) {
+    TransferFunction changed = one;
+    change(changed);
+    EXPECT_FALSE(sameOpacity(one, changed));
+    EXPECT_FALSE(sameOpacity(changed, one));
+  };
+  expectDifferent([](TransferFunction& t) { t.points[0].opacity = 0.001; });
+  expectDifferent([](TransferFunction& t) { t.points[1].opacity = 0.31; });  // below the step only
+  expectDifferent([](TransferFunction& t) { t.points[2].opacity = 0.51; });
+  expectDifferent([](TransferFunction& t) { t.points[3].value = 201.0; });
+  expectDifferent([](TransferFunction& t) { t.points.insert(t.points.begin() + 1, {60.0, {}, 0.16}); });
+  expectDifferent([](TransferFunction& t) { t.high = 254.0; });
+  expectDifferent([](TransferFunction& t) { t.low = 1.0; });
+  expectDifferent([](TransferFunction& t) { t.referenceLength = 2.0; });
+  expectDifferent([](TransferFunction& t) { t.isLabels = true; });
+}
+
 }  // namespace
 
 TEST(TransferFunction, isLinearBetweenItsPointsAndConstantBeyond) {
