@@ -8,8 +8,8 @@
 
 #include "base/placement.h"
 #include "hierarchy/attenuation_file.h"
+#include "hierarchy/value_grid.h"
 #include "splat/classification_table.h"
-#include "splat/value_grid.h"
 
 namespace freevoxel {
 

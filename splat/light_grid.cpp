@@ -7,23 +7,6 @@
 
 namespace freevoxel {
 
-glm::vec3 gradientAt(const ValueGrid& grid, glm::ivec3 p) {
-  glm::dvec3 perIndex(0.0);
-  for (int axis = 0; axis < 3; ++axis) {
-    glm::ivec3 low = p, high = p;
-    low[axis] = std::max(0, p[axis] - 1);
-    high[axis] = std::min(grid.dims[axis] - 1, p[axis] + 1);
-    if (low[axis] == high[axis]) continue;
-    perIndex[axis] =
-        (double(grid.codes[linearIndex(high, grid.dims)]) - double(grid.codes[linearIndex(low, grid.dims)])) /
-        (high[axis] - low[axis]);
-  }
-  // A gradient is a covector: it goes with the transposed inverse of the axes.
-  const glm::dmat3 worldFromIndex(grid.placement.worldFromIndex());
-  const glm::dvec3 world = glm::transpose(glm::inverse(worldFromIndex)) * perIndex;
-  return glm::vec3(world * (grid.placement.unitLength() / grid.coding.largest));
-}
-
 LightGrid lightGrid(const ValueGrid& grid, const Lighting& lighting, const Camera& camera,
                     const std::function<AttenuationGrid(const Light&)>& attenuation) {
   LightGrid result;

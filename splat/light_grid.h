@@ -7,8 +7,8 @@
 
 #include "base/camera.h"
 #include "base/light.h"
+#include "hierarchy/value_grid.h"
 #include "splat/attenuation_grid.h"
-#include "splat/value_grid.h"
 
 namespace freevoxel {
 
@@ -26,10 +26,6 @@ struct LightGrid {
 
   bool empty() const { return values.empty(); }
 };
-
-/// Change of value at voxel p per shortest voxel edge, as a share of the range of codes, in world axes: central
-/// differences, one-sided at the border.
-glm::vec3 gradientAt(const ValueGrid& grid, glm::ivec3 p);
 
 /// Ambient light, and every lamp's times what the volume lets through to the voxel times its shading. `attenuation`
 /// gives the grid towards a lamp. Throws InputError for colours or directions that make no sense.

@@ -4,7 +4,7 @@
 #include "base/camera.h"
 #include "base/image.h"
 #include "base/progress.h"
-#include "splat/value_grid.h"
+#include "hierarchy/value_grid.h"
 #include "volume/transfer_function.h"
 
 namespace freevoxel {

@@ -9,8 +9,8 @@
 #include "base/light.h"
 #include "base/progress.h"
 #include "hierarchy/attenuation_file.h"
+#include "hierarchy/value_grid.h"
 #include "splat/sums.h"
-#include "splat/value_grid.h"
 #include "volume/transfer_function.h"
 
 namespace freevoxel {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <glm/glm.hpp>
 
+#include "hierarchy/direction_lookup.h"
 #include "splat/attenuation_grid.h"
-#include "splat/direction_lookup.h"
 #include "splat/volume_view.h"
 
 namespace freevoxel {

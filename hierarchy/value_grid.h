@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
 #include <vector>
 
 #include "hierarchy/attenuation_file.h"
@@ -22,5 +24,11 @@ struct ValueGrid {
 /// Codes over the transfer function's range.
 ValueGrid valueGrid(const Volume& volume, const TransferFunction& transfer);
 ValueGrid valueGrid(const AttenuationFile& file);
+
+/// Change of value at voxel p per shortest voxel edge, as a share of the range of codes, in world axes: central
+/// differences, one-sided at the border.
+glm::vec3 gradientAt(const ValueGrid& grid, glm::ivec3 p);
+/// From a change of code per voxel along each axis of the array to what gradientAt gives: a matrix to multiply it with.
+glm::dmat3 gradientFromDifferences(const ValueGrid& grid);
 
 }  // namespace freevoxel

@@ -1,0 +1,98 @@
+#include "voxlink/trace_rays.h"
+
+#include <cmath>
+#include <glm/glm.hpp>
+
+#include "base/error.h"
+#include "voxlink/traversal.h"
+
+namespace freevoxel {
+
+void checkLighting(const Lighting& lighting) {
+  if (!(lighting.ambient >= 0.0f) || !std::isfinite(lighting.ambient)) {
+    throw InputError("light: ambient must be finite and not negative");
+  }
+  for (const Light& light : lighting.lights) {
+    for (int channel = 0; channel < 3; ++channel) {
+      if (!(light.linear[channel] >= 0.0f) || !std::isfinite(light.linear[channel])) {
+        throw InputError("light: colours must be finite and not negative");
+      }
+    }
+    if (light.directional && glm::length(light.world) == 0.0) throw InputError("light: a direction must not be 0,0,0");
+  }
+}
+
+std::vector<uint32_t> lightVoxels(const VoxLinkBuffers& buffers, const Lighting& lighting, const LightShares& shares,
+                                  const Camera& camera) {
+  checkLighting(lighting);
+  const size_t fragments = buffers.fragments.size();
+  checkEqual(shares.size(), fragments * lighting.lights.size(), "shares of light");
+  std::vector<uint32_t> light(fragments);
+  const glm::dmat4 worldFromIndex = buffers.placement.worldFromIndex();
+  const glm::dvec3 towardsOrthographicEye = glm::normalize(camera.eye - camera.target);
+  forEachStoredVoxel(buffers, [&](size_t fragment, glm::ivec3 voxel) {
+    glm::vec3 sum(lighting.ambient), normal;
+    float surface = 0.0f;
+    shared::unpackNormal(shared::fragmentNormal(buffers.fragments[fragment]), normal.x, normal.y, normal.z, surface);
+    const glm::dvec3 world(worldFromIndex * glm::dvec4(glm::dvec3(voxel), 1.0));
+    const glm::dvec3 toEye = camera.orthographicHeight ? towardsOrthographicEye : camera.eye - world;
+    const double eyeDistance = glm::length(toEye);
+    for (size_t n = 0; n < lighting.lights.size(); ++n) {
+      const Light& lamp = lighting.lights[n];
+      const glm::dvec3 toLight = lamp.directional ? lamp.world : lamp.world - world;
+      const double lightDistance = glm::length(toLight);
+      float share = float(shares[n * fragments + fragment]) * (1.0f / 255.0f);
+      if (lightDistance > 0.0 && eyeDistance > 0.0) {
+        share *= shade(lighting.shading, normal * (surface * kSurfaceGradient), glm::vec3(toLight / lightDistance),
+                       glm::vec3(toEye / eyeDistance));
+      }
+      sum += lamp.linear * share;
+    }
+    light[fragment] = shared::packLight(sum.r, sum.g, sum.b);
+  });
+  return light;
+}
+
+Image traceRays(const VoxLinkBuffers& buffers, std::span<const VoxelMaterial> materials,
+                std::span<const uint32_t> light, const Camera& camera, Progress& progress) {
+  check(light.empty() || light.size() == buffers.fragments.size(), "every fragment has light");
+  const ViewFrame frame = viewFrame(camera);
+  const glm::dmat4 indexFromWorld = glm::inverse(buffers.placement.worldFromIndex());
+  const double unit = buffers.placement.unitLength();
+  Image picture(camera.imageSize, 4);
+  progress.begin("tracing", uint64_t(camera.imageSize.y), "rows");
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int y = 0; y < camera.imageSize.y; ++y) {
+    for (int x = 0; x < camera.imageSize.x; ++x) {
+      const Ray ray = pixelRay(frame, glm::dvec2(x, y) + 0.5);
+      const glm::dvec3 origin = glm::dvec3(indexFromWorld * glm::dvec4(ray.origin, 1.0)) + 0.5;
+      const glm::dvec3 direction(indexFromWorld * glm::dvec4(ray.direction * unit, 0.0));
+      glm::vec3 gathered(0.0f);
+      float through = 1.0f;
+      traverse(buffers, origin, direction, 0.0, [&](size_t fragment, glm::ivec3, double from, double to) {
+        const VoxelMaterial& material = materials[shared::fragmentCode(buffers.fragments[fragment])];
+        const float passed = std::exp(-material.extinction * float(to - from));
+        glm::vec3 colour(material.red, material.green, material.blue);
+        if (!light.empty()) {
+          glm::vec3 arriving;
+          shared::unpackLight(light[fragment], arriving.r, arriving.g, arriving.b);
+          colour *= arriving;
+        }
+        gathered += through * (1.0f - passed) * colour;
+        through *= passed;
+        return through >= shared::kOpaqueEnough;
+      });
+      float* pixel = picture.at(x, y);
+      pixel[0] = gathered.r;
+      pixel[1] = gathered.g;
+      pixel[2] = gathered.b;
+      pixel[3] = 1.0f - through;
+    }
+#pragma omp critical(freevoxelTraceProgress)
+    progress.advance(1);
+  }
+  progress.end();
+  return picture;
+}
+
+}  // namespace freevoxel
