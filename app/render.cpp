@@ -8,6 +8,7 @@
 #include "app/light_options.h"
 #include "app/picture_output.h"
 #include "app/precompute_report.h"
+#include "app/scene_file.h"
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "hierarchy/attenuation_file.h"
@@ -192,6 +193,9 @@ Image drawVolume(RenderOptions options, const CLI::App& command, Session& sessio
 }
 
 Outcome render(RenderOptions options, const CLI::App& command, Session& session) {
+  if (isSceneFile(options.input)) {
+    useScene(command, {options.input, options.transfer, options.raw, options.camera, options.light, options.picture});
+  }
   checkOptions(options, command);
   if (options.formula != PictureFormula::raycast) options.splat.formula = splatFormula(options.formula);
   options.splat.lighting = makeLighting(options.light);
@@ -211,7 +215,9 @@ Command addRender(CLI::App& program, CommonOptions& common) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = addSubcommand(program, "render", "make a picture of an attenuation file or a volume",
                                     "freevoxel render cloud.fvx --orbit 30,20 --size 1000x800 -o cloud.png");
-  command->add_option("INPUT", options->input, "an attenuation file (.fvx) or a volume; a volume needs --transfer")
+  command
+      ->add_option("INPUT", options->input,
+                   "an attenuation file (.fvx), a volume, which needs --transfer, or a scene (.json)")
       ->required();
   addOutputOption(*command, options->picture);
   addTransferOption(*command, options->transfer,

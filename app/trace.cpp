@@ -10,6 +10,7 @@
 #include "app/input_file.h"
 #include "app/light_options.h"
 #include "app/picture_output.h"
+#include "app/scene_file.h"
 #include "base/error.h"
 #include "gl/context.h"
 #include "hierarchy/attenuation_file.h"
@@ -141,8 +142,11 @@ void reportStatistics(const VoxLinkStatistics& done, Session& session) {
   session.statistics["passes"] = done.passes;
 }
 
-Outcome trace(const TraceOptions& options, Session& session) {
+Outcome trace(TraceOptions options, const CLI::App& command, Session& session) {
   checkOutputName(options.picture);
+  if (isSceneFile(options.input)) {
+    useScene(command, {options.input, options.transfer, options.raw, options.camera, options.light, options.picture});
+  }
   const TracedVolume traced =
       isAttenuationFile(options.input) ? readFile(options, session) : readVolumeToTrace(options, session);
   const Camera camera = makeCamera(options.camera, worldBounds(traced.grid.placement, traced.grid.dims));
@@ -181,7 +185,9 @@ Command addTrace(CLI::App& program, CommonOptions& common) {
   auto options = std::make_shared<TraceOptions>();
   CLI::App* command = addSubcommand(program, "trace", "trace rays through the visible voxels of a volume (VoxLink)",
                                     "freevoxel trace cloud.nrrd --transfer cloud.json --orbit 30,20 -o cloud.png");
-  command->add_option("INPUT", options->input, "a volume, which needs --transfer, or an attenuation file (.fvx)")
+  command
+      ->add_option("INPUT", options->input,
+                   "a volume, which needs --transfer, an attenuation file (.fvx), or a scene (.json)")
       ->required();
   addOutputOption(*command, options->picture);
   addTransferOption(*command, options->transfer, "; for an attenuation file one of the same range (default: its own)");
@@ -226,7 +232,7 @@ Command addTrace(CLI::App& program, CommonOptions& common) {
   addLightOptions(*command, options->light);
   addVolumeOptions(*command, options->raw);
   addCommonOptions(*command, common);
-  return {command, [options](Session& session) { return trace(*options, session); }};
+  return {command, [options, command](Session& session) { return trace(*options, *command, session); }};
 }
 
 }  // namespace freevoxel

@@ -134,7 +134,8 @@ class DirectionShare {
   float operator()(glm::ivec3 voxel, float depth) {
     if (!lamp_.directional) {
       const glm::dvec3 towards = lamp_.from(glm::dvec3(voxel));
-      if (towards == glm::dvec3(0.0)) return direction_ == 0 ? 1.0f : 0.0f;  // the lamp's own voxel
+      const glm::dvec3 size = glm::abs(towards);
+      if (std::max({size.x, size.y, size.z}) < 0.5) return direction_ == 0 ? 1.0f : 0.0f;  // the lamp is in this voxel
       use(towards);
     }
     return weight_ > 0.0f ? weight_ * std::exp(-power_ * depth) : 0.0f;

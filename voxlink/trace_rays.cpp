@@ -8,6 +8,18 @@
 
 namespace freevoxel {
 
+namespace {
+
+/// Every packed normal, and how much of a surface it is.
+std::vector<glm::vec4> unpackedNormals() {
+  std::vector<glm::vec4> normals(size_t(1) << 16);
+  for (size_t i = 0; i < normals.size(); ++i)
+    shared::unpackNormal(uint32_t(i), normals[i].x, normals[i].y, normals[i].z, normals[i].w);
+  return normals;
+}
+
+}  // namespace
+
 void checkLighting(const Lighting& lighting) {
   if (!(lighting.ambient >= 0.0f) || !std::isfinite(lighting.ambient)) {
     throw InputError("light: ambient must be finite and not negative");
@@ -28,25 +40,43 @@ std::vector<uint32_t> lightVoxels(const VoxLinkBuffers& buffers, const Lighting&
   const size_t fragments = buffers.fragments.size();
   checkEqual(shares.size(), fragments * lighting.lights.size(), "shares of light");
   std::vector<uint32_t> light(fragments);
-  const glm::dmat4 worldFromIndex = buffers.placement.worldFromIndex();
-  const glm::dvec3 towardsOrthographicEye = glm::normalize(camera.eye - camera.target);
+  // Places are in shortest voxel edges from voxel (0,0,0), along the axes of the world.
+  const double unit = buffers.placement.unitLength();
+  const auto placeOf = [&](glm::dvec3 world) { return glm::vec3((world - buffers.placement.origin) / unit); };
+  glm::mat3 lengthFromIndex(1.0f);
+  for (int axis = 0; axis < 3; ++axis)
+    lengthFromIndex[axis] = glm::vec3(buffers.placement.direction[axis] * (buffers.placement.spacing[axis] / unit));
+  struct Lamp {
+    bool directional;
+    glm::vec3 place, linear;
+  };
+  std::vector<Lamp> lamps;
+  for (const Light& lamp : lighting.lights) {
+    lamps.push_back({lamp.directional, lamp.directional ? glm::vec3(glm::normalize(lamp.world)) : placeOf(lamp.world),
+                     lamp.linear});
+  }
+  const bool orthographic = camera.orthographicHeight.has_value();
+  const glm::vec3 eye = orthographic ? glm::vec3(glm::normalize(camera.eye - camera.target)) : placeOf(camera.eye);
+  const std::vector<glm::vec4> normals = unpackedNormals();
   forEachStoredVoxel(buffers, [&](size_t fragment, glm::ivec3 voxel) {
-    glm::vec3 sum(lighting.ambient), normal;
-    float surface = 0.0f;
-    shared::unpackNormal(shared::fragmentNormal(buffers.fragments[fragment]), normal.x, normal.y, normal.z, surface);
-    const glm::dvec3 world(worldFromIndex * glm::dvec4(glm::dvec3(voxel), 1.0));
-    const glm::dvec3 toEye = camera.orthographicHeight ? towardsOrthographicEye : camera.eye - world;
-    const double eyeDistance = glm::length(toEye);
-    for (size_t n = 0; n < lighting.lights.size(); ++n) {
-      const Light& lamp = lighting.lights[n];
-      const glm::dvec3 toLight = lamp.directional ? lamp.world : lamp.world - world;
-      const double lightDistance = glm::length(toLight);
-      float share = float(shares[n * fragments + fragment]) * (1.0f / 255.0f);
-      if (lightDistance > 0.0 && eyeDistance > 0.0) {
-        share *= shade(lighting.shading, normal * (surface * kSurfaceGradient), glm::vec3(toLight / lightDistance),
-                       glm::vec3(toEye / eyeDistance));
+    glm::vec3 sum(lighting.ambient);
+    const glm::vec4 normal = normals[shared::fragmentNormal(buffers.fragments[fragment])];
+    const glm::vec3 place = lengthFromIndex * glm::vec3(voxel);
+    const glm::vec3 toEye = orthographic ? eye : eye - place;
+    const float eyeDistance = glm::length(toEye);
+    for (size_t n = 0; n < lamps.size(); ++n) {
+      const uint8_t code = shares[n * fragments + fragment];
+      if (code == 0) continue;
+      float share = float(code) * (1.0f / 255.0f);
+      if (lighting.shading != Shading::none && normal.w > 0.0f) {
+        const glm::vec3 toLight = lamps[n].directional ? lamps[n].place : lamps[n].place - place;
+        const float lightDistance = glm::length(toLight);
+        if (lightDistance > 0.0f && eyeDistance > 0.0f) {
+          share *= shade(lighting.shading, glm::vec3(normal) * (normal.w * kSurfaceGradient), toLight / lightDistance,
+                         toEye / eyeDistance);
+        }
       }
-      sum += lamp.linear * share;
+      sum += lamps[n].linear * share;
     }
     light[fragment] = shared::packLight(sum.r, sum.g, sum.b);
   });

@@ -41,6 +41,8 @@ struct VoxLink::State {
   Lighting lighting;
   Shadows shadows = Shadows::none;
   LightShares shares;
+  std::vector<uint32_t> light;  ///< cpu
+  bool lit = false;             ///< light at the voxels is that of `lighting`, whatever the camera
   VoxLinkStatistics statistics;
 
   void build(Progress& progress);
@@ -70,6 +72,8 @@ void VoxLink::State::build(Progress& progress) {
 }
 
 void VoxLink::State::findShares() {
+  lit = false;
+  light.clear();
   if (lighting.unlit()) {
     if (onGpu) onGpu->unlit();
     return;
@@ -142,20 +146,20 @@ void VoxLink::light(const Lighting& lighting, Shadows shadows) {
 Image VoxLink::trace(const Camera& camera, Progress& progress) {
   State& state = *state_;
   VoxLinkStatistics& statistics = state.statistics;
-  std::vector<uint32_t> light;
-  if (!state.lighting.unlit()) {
+  if (!state.lighting.unlit() && !state.lit) {
     const Stopwatch watch(statistics.lightSeconds);
     if (state.onGpu) {
       state.onGpu->light(state.lighting, camera);
       glFinish();
     } else {
-      light = lightVoxels(state.buffers, state.lighting, state.shares, camera);
+      state.light = lightVoxels(state.buffers, state.lighting, state.shares, camera);
     }
+    state.lit = state.lighting.shading == Shading::none;
   }
   const Stopwatch watch(statistics.traceSeconds);
   if (state.onGpu) return state.onGpu->trace(camera, state.options.steps, statistics.passes);
   statistics.passes = 1;
-  return traceRays(state.buffers, state.materials, light, camera, progress);
+  return traceRays(state.buffers, state.materials, state.light, camera, progress);
 }
 
 const VoxLinkStatistics& VoxLink::statistics() const {

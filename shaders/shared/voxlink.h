@@ -94,7 +94,9 @@ SHARED_FUNCTION uint packNormal(float x, float y, float z, float surface) {
   float sum = (x * x + y * y + z * z) / (size * size);
   float cosine = z / size * (1.0f / pow(sum, 0.5f));
   uint polar = uint(acos(min(max(cosine, -1.0f), 1.0f)) * (127.0f / kPi) + 0.5f);
-  float turn = arcTangent(y / size, x / size) * (64.0f / kPi);
+  // At the poles there is no azimuth, and GLSL leaves it open which one it tells.
+  float across = max(max(x, -x), max(y, -y)) / size;
+  float turn = across < 1e-6f ? 0.0f : arcTangent(y / size, x / size) * (64.0f / kPi);
   uint azimuth = uint(turn < 0.0f ? turn + 128.5f : turn + 0.5f) & 127u;
   uint strength = uint(min(surface, 1.0f) * 3.0f + 0.5f);
   return polar | azimuth << 7 | strength << 14;
