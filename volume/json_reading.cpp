@@ -148,9 +148,13 @@ std::shared_ptr<const JsonLines> jsonLines(const std::string& text) {
 }
 
 void JsonPlace::fail(const std::string& what) const {
+  failAt(way_, what);
+}
+
+void JsonPlace::failAt(const std::string& place, const std::string& what) const {
   std::string where = file_;
   if (lines_ != nullptr) {
-    if (const auto line = lines_->find(way_); line != lines_->end()) where += fmt::format(": line {}", line->second);
+    if (const auto line = lines_->find(place); line != lines_->end()) where += fmt::format(": line {}", line->second);
   }
   throw InputError(way_.empty() ? fmt::format("{}: {}", where, what) : fmt::format("{}: {}: {}", where, way_, what));
 }
@@ -174,7 +178,8 @@ void JsonPlace::onlyKeys(std::initializer_list<const char*> keys) const {
     std::string known;
     for (const char* key : keys)
       known += fmt::format("{}{}", known.empty() ? "" : ", ", key);
-    fail(fmt::format("unknown key {}, expected {}", inQuotes(item.key()), known));
+    failAt(way_.empty() ? item.key() : way_ + "." + item.key(),
+           fmt::format("unknown key {}, expected {}", inQuotes(item.key()), known));
   }
 }
 

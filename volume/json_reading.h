@@ -58,6 +58,8 @@ class JsonPlace {
     place.way_ = std::move(way);
     return place;
   }
+  /// Fails with the line of another place.
+  [[noreturn]] void failAt(const std::string& place, const std::string& what) const;
   std::string found() const;
 
   const nlohmann::json* value_;

@@ -64,17 +64,22 @@ std::vector<uint32_t> lightVoxels(const VoxLinkBuffers& buffers, const Lighting&
     const glm::vec3 place = lengthFromIndex * glm::vec3(voxel);
     const glm::vec3 toEye = orthographic ? eye : eye - place;
     const float eyeDistance = glm::length(toEye);
+    const bool shaded = lighting.shading != Shading::none && normal.w > 0.0f && eyeDistance > 0.0f;
+    const glm::vec3 towardsEye = toEye * (1.0f / std::max(eyeDistance, 1e-30f));
     for (size_t n = 0; n < lamps.size(); ++n) {
       const uint8_t code = shares[n * fragments + fragment];
       if (code == 0) continue;
       float share = float(code) * (1.0f / 255.0f);
-      if (lighting.shading != Shading::none && normal.w > 0.0f) {
-        const glm::vec3 toLight = lamps[n].directional ? lamps[n].place : lamps[n].place - place;
-        const float lightDistance = glm::length(toLight);
-        if (lightDistance > 0.0f && eyeDistance > 0.0f) {
-          share *= shade(lighting.shading, glm::vec3(normal) * (normal.w * kSurfaceGradient), toLight / lightDistance,
-                         toEye / eyeDistance);
+      if (shaded) {
+        glm::vec3 towardsLight = lamps[n].place;
+        bool apart = true;
+        if (!lamps[n].directional) {
+          towardsLight -= place;
+          const float distance = glm::length(towardsLight);
+          apart = distance > 0.0f;
+          towardsLight *= 1.0f / std::max(distance, 1e-30f);
         }
+        if (apart) share *= shadeSurface(lighting.shading, glm::vec3(normal), normal.w, towardsLight, towardsEye);
       }
       sum += lamps[n].linear * share;
     }
