@@ -37,7 +37,7 @@ else
   machine="no GPU: plain C++ on $(value threads) threads, few views"
 fi
 size=${SIZE:-1000x1000}
-view=(--size "$size" --orbit 0,0 --fov 30)
+view=(--orbit 0,0 --fov 30)
 
 for r in $resolutions; do
   for kind in kronecker sphere; do
@@ -65,7 +65,7 @@ measure() { # NAME RESOLUTION BRICK ARGUMENTS...
   local name=$1 resolution=$2 brick=$3
   shift 3
   echo "$name $resolution [$brick]" >&2
-  trace "$@" --brick "$brick" --backend "$backend" --turn "$views" "${view[@]}" -o "$scratch/picture.png"
+  trace "$@" --brick "$brick" --backend "$backend" --turn "$views" "${view[@]}" --size "$size" -o "$scratch/picture.png"
   printf '| %s | %s [%s] | ' "$name" "$resolution" "$brick"
   echo "$(value storedVoxels) $(value voxels) $(value occupiedBricks) $(value bricks) $(value bufferBytes) \
     $(value bytesPerStoredVoxel) $(value framesPerSecond) $(value raysPerSecond) $(value build)" |
@@ -114,7 +114,7 @@ lamps=(--light-direction=1,0.2,0.8 --light-direction=-1,0.5,0.3 --light-directio
       shading=()
       ((n == 0)) || shading=(--shading phong)
       trace "${carp[@]}" --backend "$backend" --shadows "$shadows" "${lamps[@]:0:n}" "${shading[@]}" --turn "$views" \
-        "${view[@]}" -o "$scratch/picture.png"
+        "${view[@]}" --size "$size" -o "$scratch/picture.png"
       printf '| %s | %s | %.3f | %.2f |\n' "$n" "$([[ $n == 0 ]] && echo - || echo "$shadows")" \
         "$(value framesPerSecond | awk '{print 1 / $1}')" "$(value shadows)"
     done
