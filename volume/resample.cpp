@@ -66,7 +66,8 @@ Volume resampled(const Volume& volume, glm::ivec3 dims) {
   }
   const uint64_t machine = uint64_t(sysconf(_SC_PHYS_PAGES)) * uint64_t(sysconf(_SC_PAGESIZE));
   const auto bytes = checkedProduct(voxelCount(dims), bytesPerValue(volume.header.type));
-  if (!bytes || *bytes > machine) {
+  // Whoever wants values wants their codes too.
+  if (!bytes || *bytes > machine || *bytes + voxelCount(dims) * sizeof(uint16_t) > machine) {
     throw MachineError(
         fmt::format("resampling to {} x {} x {} voxels takes more memory than the {} MiB of this "
                     "machine; choose a lower resolution",

@@ -57,7 +57,8 @@ TEST_F(Scenes, sayWhatOptionsSay) {
   for (const std::string command : {"trace", "render"}) {
     run(command + " scene.json --backend cpu -o a.exr");
     run(command + " " + kOptions + "--backend cpu -o b.exr");
-    expectIdentical("a.exr", "b.exr");
+    // Lamps add in another order.
+    EXPECT_GE(compareImages(readImage(folder + "/a.exr"), readImage(folder + "/b.exr")).psnr, 60.0) << command;
   }
 }
 
@@ -73,7 +74,7 @@ TEST_F(Scenes, areCheckedWithTheLineAndWhatWasExpected) {
   expectWrong("[61, 43]", "[61]", "wrong.json: line 5: image.size: expected [width, height]");
   expectWrong("[61, 43]", "[61, 0.5]", "line 5: image.size[1]: expected a whole number in 1..32768");
   expectWrong("#204060", "bluish", "line 5: image.background");
-  expectWrong("\"position\"", "\"place\"", "line 7: lights[1]: unknown key \"place\"");
+  expectWrong("\"position\"", "\"place\"", "line 7: lights[1]: unknown key 'place'");
   expectWrong("[-90, 50, 20]", "[-90,\n 50, null]", "line 8: lights[1].position[2]: expected a number");
   expectWrong("\"phong\"", "\"gouraud\"", "line 9: shading: expected one of none, lambert, phong, found 'gouraud'");
   expectWrong("\"orbit\"", "\"eye\": [1, 2, 3], \"orbit\"", "line 4: camera: expected either 'orbit' or 'eye'");
