@@ -30,6 +30,7 @@ Command addVerify(CLI::App& program, CommonOptions& common);
 Command addRender(CLI::App& program, CommonOptions& common);
 Command addCompare(CLI::App& program, CommonOptions& common);
 Command addTransfer(CLI::App& program, CommonOptions& common);
+Command addTrace(CLI::App& program, CommonOptions& common);
 Command addSheet(CLI::App& program, CommonOptions& common);
 
 }  // namespace freevoxel

@@ -64,10 +64,10 @@ int run(int argc, char** argv) {
       "freevoxel COMMAND --help is complete. Exit status: 0 done, 1 the input or the machine would not do, "
       "2 usage.");
   CommonOptions common;
-  const std::vector<Command> commands = {addGenerate(program, common), addPrecompute(program, common),
-                                         addInfo(program, common),     addVerify(program, common),
-                                         addRender(program, common),   addCompare(program, common),
-                                         addTransfer(program, common), addSheet(program, common)};
+  const std::vector<Command> commands = {
+      addGenerate(program, common), addPrecompute(program, common), addInfo(program, common),
+      addVerify(program, common),   addRender(program, common),     addCompare(program, common),
+      addTransfer(program, common), addSheet(program, common),      addTrace(program, common)};
   int status = kDone;
   const Command* command = parse(program, commands, argc, argv, status);
   if (command == nullptr) return status;

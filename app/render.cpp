@@ -6,7 +6,9 @@
 #include "app/command.h"
 #include "app/input_file.h"
 #include "app/light_options.h"
+#include "app/picture_output.h"
 #include "app/precompute_report.h"
+#include "app/scene_file.h"
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "hierarchy/attenuation_file.h"
@@ -21,13 +23,9 @@ namespace {
 
 enum class PictureFormula { paper, direct, normalised, blended, raycast };
 
-struct Background {
-  bool transparent = false;
-  glm::vec3 srgb{0.0f};
-};
-
 struct RenderOptions {
-  std::string input, output, sums, transfer;
+  std::string input, sums, transfer;
+  PictureOptions picture;
   VolumeOptions raw;
   CameraOptions camera;
   LightOptions light;
@@ -36,7 +34,6 @@ struct RenderOptions {
   BlendKernel blendKernel = BlendKernel::normalised;
   Backend backend = Backend::automatic;
   RaycastOptions raycast;
-  std::optional<Background> background;
 };
 
 Formula splatFormula(PictureFormula formula) {
@@ -52,11 +49,6 @@ Formula splatFormula(PictureFormula formula) {
       break;
   }
   throw InternalError("internal error: this formula has no sums");
-}
-
-Background parseBackground(std::string_view text) {
-  if (text == "transparent") return {true, glm::vec3(0.0f)};
-  return {false, parseColour(text)};
 }
 
 SplatOrder parseOrder(std::string_view text) {
@@ -90,10 +82,7 @@ void checkOptions(const RenderOptions& options, const CLI::App& command) {
   onlyWith(options.formula != PictureFormula::raycast, {"--light-attenuation"}, "normalised, direct, paper or blended");
   onlyWith(options.formula == PictureFormula::raycast, {"--raycast", "--step", "--shadow-step"}, "raycast");
   onlyWith(options.formula == PictureFormula::blended, {"--blend-kernel"}, "blended");
-  const std::string extension = lowerCaseExtension(options.output);
-  if (extension != "png" && extension != "exr") {
-    throw UsageError(fmt::format("--output: expected a name ending in .png or .exr, found '{}'", options.output));
-  }
+  checkOutputName(options.picture);
   if (!options.sums.empty() && lowerCaseExtension(options.sums) != "exr") {
     throw UsageError(fmt::format("--sums: expected a name ending in .exr, found '{}'", options.sums));
   }
@@ -217,7 +206,7 @@ Image drawVolume(RenderOptions options, const CLI::App& command, Session& sessio
   if (!needsFile(options)) return drawSplats(grid, nullptr, transfer, options, session);
   session.tell("precomputing into a temporary file; `freevoxel precompute` keeps it for the next picture");
   // Never committed, so it goes when this function ends.
-  const AtomicFile scratch(options.output + ".fvx");
+  const AtomicFile scratch(options.picture.output + ".fvx");
   PrecomputeOptions precomputeOptions;
   precomputeOptions.command = session.command();
   if (options.formula == PictureFormula::paper || transfer.isLabels)
@@ -228,25 +217,10 @@ Image drawVolume(RenderOptions options, const CLI::App& command, Session& sessio
   return drawSplats(grid, &file, transfer, options, session);
 }
 
-void writePicture(const RenderOptions& options, Image picture, Session& session) {
-  const std::vector<std::string> channels = {"R", "G", "B", "A"};
-  const bool png = lowerCaseExtension(options.output) == "png";
-  const bool transparent = options.background ? options.background->transparent : !png;
-  if (!transparent) {
-    const glm::vec3 srgb = options.background ? options.background->srgb : glm::vec3(0.0f);
-    picture =
-        overBackground(picture, glm::vec3(linearFromSrgb(srgb.r), linearFromSrgb(srgb.g), linearFromSrgb(srgb.b)));
-  }
-  session.timed("write", [&] {
-    if (png) {
-      writePng(options.output, picture, session.imageMetadata(), transparent);
-    } else {
-      writeExr(options.output, picture, channels, session.imageMetadata());
-    }
-  });
-}
-
 Outcome render(RenderOptions options, const CLI::App& command, Session& session) {
+  if (isSceneFile(options.input)) {
+    useScene(command, {options.input, options.transfer, options.raw, options.camera, options.light, options.picture});
+  }
   checkOptions(options, command);
   if (hasSums(options.formula)) options.splat.formula = splatFormula(options.formula);
   options.splat.lighting = options.raycast.lighting = makeLighting(options.light);
@@ -254,7 +228,7 @@ Outcome render(RenderOptions options, const CLI::App& command, Session& session)
     options.splat.footprint = Footprint::kernel;
   }
   writePicture(
-      options,
+      options.picture,
       isAttenuationFile(options.input) ? drawFile(options, command, session) : drawVolume(options, command, session),
       session);
   return Outcome::done;
@@ -266,13 +240,11 @@ Command addRender(CLI::App& program, CommonOptions& common) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = addSubcommand(program, "render", "make a picture of an attenuation file or a volume",
                                     "freevoxel render cloud.fvx --orbit 30,20 --size 1000x800 -o cloud.png");
-  command->add_option("INPUT", options->input, "an attenuation file (.fvx) or a volume; a volume needs --transfer")
-      ->required();
   command
-      ->add_option("-o,--output", options->output,
-                   "the picture: PNG is sRGB, 8 bits; EXR is linear, premultiplied, 32 bits, with alpha")
-      ->type_name("FILE.png|FILE.exr")
+      ->add_option("INPUT", options->input,
+                   "an attenuation file (.fvx), a volume, which needs --transfer, or a scene (.json)")
       ->required();
+  addOutputOption(*command, options->picture);
   addTransferOption(*command, options->transfer,
                     "; for an attenuation file a file of the same opacities (default: the file's own)");
   addChoice<PictureFormula>(*command, "--formula", options->formula,
@@ -326,10 +298,7 @@ Command addRender(CLI::App& program, CommonOptions& common) {
                         "order of splats; the bits are the same (default hilbert)", parseOrder);
   command->add_option("--sums", options->sums, "write the six sums of every pixel: R G B O DepthHigh DepthLow")
       ->type_name("FILE.exr");
-  addParsed(*command, "--background", options->background, "COLOUR",
-            "sRGB: #rrggbb, r,g,b from 0 to 1, transparent, or one of " + colourNames() +
-                " (default: black for PNG, transparent for EXR)",
-            parseBackground);
+  addBackgroundOption(*command, options->picture);
   addCameraOptions(*command, options->camera);
   addLightOptions(*command, options->light);
   addVolumeOptions(*command, options->raw);

@@ -1,17 +1,22 @@
 #include "base/light.h"
 
-#include <algorithm>
-#include <cmath>
-#include <glm/geometric.hpp>
+#include "base/error.h"
 
 namespace freevoxel {
 
-namespace {
-
-/// cosine^kPhongExponent is below 2^-24 from here down.
-constexpr float kNoHighlight = 0.5f;
-
-}  // namespace
+void checkLighting(const Lighting& lighting) {
+  for (const Light& light : lighting.lights) {
+    for (int channel = 0; channel < 3; ++channel) {
+      if (!(light.linear[channel] >= 0.0f) || !std::isfinite(light.linear[channel])) {
+        throw InputError("light: colours must be finite and not negative");
+      }
+    }
+    if (light.directional && glm::length(light.world) == 0.0) throw InputError("light: a direction must not be 0,0,0");
+  }
+  if (!(lighting.ambient >= 0.0f) || !std::isfinite(lighting.ambient)) {
+    throw InputError("light: ambient must be finite and not negative");
+  }
+}
 
 Surface surfaceFacing(glm::vec3 gradient, glm::vec3 towardsEye) {
   const float steepness = glm::length(gradient);
@@ -25,13 +30,7 @@ Surface surfaceFacing(glm::vec3 gradient, glm::vec3 towardsEye) {
 
 float shade(Shading shading, const Surface& surface, glm::vec3 towardsLight, glm::vec3 towardsEye) {
   if (shading == Shading::none || surface.share == 0.0f) return 1.0f;
-  const float cosine = std::max(0.0f, glm::dot(surface.normal, towardsLight));
-  float shaded = cosine;
-  if (shading == Shading::phong && cosine > 0.0f) {
-    const float mirrored = glm::dot(2.0f * cosine * surface.normal - towardsLight, towardsEye);
-    if (mirrored > kNoHighlight) shaded += kPhongHighlight * std::pow(mirrored, kPhongExponent);
-  }
-  return 1.0f + surface.share * (shaded - 1.0f);
+  return shadeSurface(shading, surface.normal, surface.share, towardsLight, towardsEye);
 }
 
 float largestShade(Shading shading) {

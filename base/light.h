@@ -1,6 +1,8 @@
 // Lamps and how surfaces answer to them.
 #pragma once
 
+#include <algorithm>
+#include <glm/geometric.hpp>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -28,6 +30,9 @@ struct Lighting {
   bool unlit() const { return lights.empty() && ambient == 1.0f; }
 };
 
+/// Throws InputError for colours or directions that make no sense.
+void checkLighting(const Lighting& lighting);
+
 /// Share of diffuse light in Phong shading, share and exponent of the highlight.
 inline constexpr float kPhongHighlight = 0.35f;
 inline constexpr float kPhongExponent = 24.0f;
@@ -48,6 +53,22 @@ Surface surfaceFacing(glm::vec3 gradient, glm::vec3 towardsEye);
 
 /// How much of a lamp's light a place sends to the eye. `towardsLight`, `towardsEye`: unit vectors, world.
 float shade(Shading shading, const Surface& surface, glm::vec3 towardsLight, glm::vec3 towardsEye);
+
+/// The same of a unit normal and how much of a surface it is, 0..1; inline, for loops over voxels.
+inline float shadeSurface(Shading shading, glm::vec3 normal, float surface, glm::vec3 towardsLight,
+                          glm::vec3 towardsEye) {
+  const float side = glm::dot(normal, towardsEye) < 0.0f ? -1.0f : 1.0f;
+  const float cosine = std::max(0.0f, side * glm::dot(normal, towardsLight));
+  float shaded = cosine;
+  if (shading == Shading::phong && cosine > 0.0f) {
+    const float along =
+        std::max(0.0f, 2.0f * cosine * side * glm::dot(normal, towardsEye) - glm::dot(towardsLight, towardsEye));
+    static_assert(kPhongExponent == 24.0f);
+    const float along4 = along * along * along * along, along8 = along4 * along4;
+    shaded += kPhongHighlight * (along8 * along8 * along8);
+  }
+  return 1.0f + surface * (shaded - 1.0f);
+}
 
 /// Largest value of `shade`.
 float largestShade(Shading shading);

@@ -19,7 +19,7 @@ section() {
 }
 
 section freevoxel
-for command in generate precompute transfer info verify render compare sheet; do
+for command in generate precompute transfer info verify render trace compare sheet; do
   section "$command" "$command"
 done
 
@@ -41,7 +41,11 @@ Every command takes `--stats FILE.json` and writes what it did; of these keys th
 | `largestValueError` | by coding values as whole numbers, in data units |
 | `blocks`, `culledBlocks` | drawn (precompute: stored); outside the view |
 | `splats`, `culledSplats`, `fragments` | drawn; without a pixel; pixels that splats covered |
-| `quantum`, `passes` | what sums are multiples of; how often the picture was drawn until the sums proved exact |
+| `quantum`, `passes` | what sums are multiples of; how often the picture was drawn until the sums proved exact; of `trace`, passes of bounded steps |
+| `bricks`, `occupiedBricks` | of `trace`: of the grid over the stored voxels; with a stored voxel |
+| `bufferBytes`, `bytesPerStoredVoxel` | of `trace`: of all buffers that rays read without lamps; divided by `storedVoxels` |
+| `builds` | of `trace`: how often voxels were stored, 2 if an edit needed others |
+| `frameSeconds`, `framesPerSecond`, `raysPerSecond` | of `trace --turn`: of its views |
 | `identical`, `psnr`, `ssim`, `rms`, `maxError`, `differingBytes`, `coveredPixels` | of `compare` |
 | `peakMemoryBytes` | largest resident memory of the process |
 | `warnings` | what the user was warned of |

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "base/placement.h"
+#include "hierarchy/value_grid.h"
 #include "splat/classification_table.h"
-#include "splat/value_grid.h"
 #include "volume/transfer_function.h"
 
 namespace freevoxel {

@@ -6,10 +6,10 @@
 #include <glm/vec3.hpp>
 #include <span>
 
+#include "hierarchy/value_grid.h"
 #include "shaders/shared/cell_segment.h"
 #include "splat/attenuation_grid.h"
 #include "splat/light_grid.h"
-#include "splat/value_grid.h"
 #include "splat/visible_blocks.h"
 #include "splat/volume_view.h"
 

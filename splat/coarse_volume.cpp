@@ -5,8 +5,8 @@
 #include <glm/glm.hpp>
 #include <numbers>
 
+#include "hierarchy/direction_lookup.h"
 #include "shaders/shared/directions.h"
-#include "splat/direction_lookup.h"
 
 namespace freevoxel {
 

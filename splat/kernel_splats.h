@@ -4,10 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "hierarchy/value_grid.h"
 #include "shaders/shared/kernel_splat.h"
 #include "splat/attenuation_grid.h"
 #include "splat/light_grid.h"
-#include "splat/value_grid.h"
 #include "splat/volume_view.h"
 #include "volume/transfer_function.h"
 

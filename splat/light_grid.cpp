@@ -5,23 +5,8 @@
 
 #include "base/error.h"
 #include "base/first_exception.h"
-#include "splat/gradient.h"
 
 namespace freevoxel {
-
-void checkLighting(const Lighting& lighting) {
-  for (const Light& light : lighting.lights) {
-    for (int channel = 0; channel < 3; ++channel) {
-      if (!(light.linear[channel] >= 0.0f) || !std::isfinite(light.linear[channel])) {
-        throw InputError("light: colours must be finite and not negative");
-      }
-    }
-    if (light.directional && glm::length(light.world) == 0.0) throw InputError("light: a direction must not be 0,0,0");
-  }
-  if (!(lighting.ambient >= 0.0f) || !std::isfinite(lighting.ambient)) {
-    throw InputError("light: ambient must be finite and not negative");
-  }
-}
 
 namespace {
 
@@ -36,7 +21,7 @@ class Lamps {
         attenuations_(attenuations),
         result_(result),
         worldFromIndex_(grid.placement.worldFromIndex()),
-        gradientFromIndex_(worldFromIndexGradient(grid)),
+        gradientFromIndex_(gradientFromDifferences(grid)),
         towardsOrthographicEye_(glm::normalize(camera.eye - camera.target)) {
     for (const Light& light : lighting.lights)
       directions_.push_back(light.directional ? glm::normalize(light.world) : glm::dvec3(0.0));

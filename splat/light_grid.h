@@ -8,9 +8,9 @@
 
 #include "base/camera.h"
 #include "base/light.h"
+#include "hierarchy/value_grid.h"
 #include "splat/attenuation_grid.h"
 #include "splat/stored_attenuation.h"
-#include "splat/value_grid.h"
 
 namespace freevoxel {
 
@@ -34,9 +34,6 @@ struct LampAttenuation {
   std::optional<StoredAttenuation> stored;
   AttenuationGrid grid;  ///< if not `stored`
 };
-
-/// Throws InputError for colours or directions that make no sense.
-void checkLighting(const Lighting& lighting);
 
 /// Ambient light, and every lamp's times what the volume lets through to the voxel times its shading, in one pass over
 /// the voxels that a visible cell touches (what other voxels get does not matter). `attenuations`: one per lamp. `file`

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "base/error.h"
-#include "splat/gradient.h"
 #include "splat/light_grid.h"
 #include "splat/volume_view.h"
 
@@ -47,7 +46,7 @@ class Caster {
       : grid_(grid),
         options_(options),
         worldFromIndex_(grid.placement.worldFromIndex()),
-        gradientFromIndex_(worldFromIndexGradient(grid)) {
+        gradientFromIndex_(gradientFromDifferences(grid)) {
     for (const Light& light : options.lighting.lights) {
       targets_.push_back(light.directional ? Towards::direction(grid.placement, light.world)
                                            : Towards::point(grid.placement, light.world));

@@ -8,8 +8,8 @@
 #include "base/image.h"
 #include "base/light.h"
 #include "base/progress.h"
+#include "hierarchy/value_grid.h"
 #include "splat/attenuation_grid.h"
-#include "splat/value_grid.h"
 #include "volume/transfer_function.h"
 
 namespace freevoxel {

@@ -10,9 +10,9 @@
 #include "base/light.h"
 #include "base/progress.h"
 #include "hierarchy/attenuation_file.h"
+#include "hierarchy/value_grid.h"
 #include "splat/blend_kernels.h"
 #include "splat/sums.h"
-#include "splat/value_grid.h"
 #include "volume/transfer_function.h"
 
 namespace freevoxel {

@@ -6,7 +6,7 @@
 
 #include "base/error.h"
 #include "base/first_exception.h"
-#include "splat/direction_lookup.h"
+#include "hierarchy/direction_lookup.h"
 #include "splat/volume_view.h"
 
 namespace freevoxel {

@@ -4,7 +4,7 @@
 #include <glm/vec3.hpp>
 #include <vector>
 
-#include "splat/value_grid.h"
+#include "hierarchy/value_grid.h"
 #include "volume/transfer_function.h"
 
 namespace freevoxel {

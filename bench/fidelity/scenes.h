@@ -7,8 +7,8 @@
 
 #include "base/camera.h"
 #include "hierarchy/attenuation_file.h"
+#include "hierarchy/value_grid.h"
 #include "precompute/format.h"
-#include "splat/value_grid.h"
 #include "volume/transfer_function.h"
 
 namespace freevoxel::bench {

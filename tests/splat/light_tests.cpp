@@ -5,7 +5,6 @@
 #include <glm/glm.hpp>
 
 #include "base/error.h"
-#include "splat/gradient.h"
 #include "splat/light_grid.h"
 #include "tests/splat/scene.h"
 
@@ -31,8 +30,8 @@ TEST(Shade, LambertIsTheCosineOnTheSideThatFacesTheEye) {
 TEST(Shade, PhongAddsAHighlightWhereTheMirroredLightMeetsTheEye) {
   const glm::vec3 steep(0.0f, 0.0f, 0.5f), ahead(0.0f, 0.0f, 1.0f);
   const glm::vec3 light(std::sin(0.5f), 0.0f, std::cos(0.5f)), mirrored(-light.x, 0.0f, light.z);
-  EXPECT_NEAR(shade(Shading::phong, surfaceFacing(steep, mirrored), light, mirrored),
-              std::cos(0.5f) + kPhongHighlight, 1e-5);
+  EXPECT_NEAR(shade(Shading::phong, surfaceFacing(steep, mirrored), light, mirrored), std::cos(0.5f) + kPhongHighlight,
+              1e-5);
   EXPECT_LE(shade(Shading::phong, surfaceFacing(steep, ahead), ahead, ahead), largestShade(Shading::phong));
 }
 
@@ -42,7 +41,7 @@ TEST(Gradient, OfARampIsItsSlopeInWorldAxes) {
   volume.header.placement.direction = glm::dmat3(glm::dvec3(0, -1, 0), glm::dvec3(1, 0, 0), glm::dvec3(0, 0, 1));
   const ValueGrid grid = valueGrid(volume, uniformOpacity(0.1));
   for (const int x : {0, 4, 8}) {
-    const glm::vec3 gradient = worldFromIndexGradient(grid) * indexGradient(grid, {x, 2, 3});
+    const glm::vec3 gradient = gradientAt(grid, {x, 2, 3});
     EXPECT_NEAR(gradient.x, 0.0, 1e-7);
     EXPECT_NEAR(gradient.y, -10.0 / 255.0 / 2.0 * 0.5, 1e-7);
     EXPECT_NEAR(gradient.z, 0.0, 1e-7);

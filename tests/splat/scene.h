@@ -8,9 +8,9 @@
 
 #include "base/camera.h"
 #include "hierarchy/attenuation_file.h"
+#include "hierarchy/value_grid.h"
 #include "splat/raycast.h"
 #include "splat/splat.h"
-#include "splat/value_grid.h"
 #include "volume/transfer_function.h"
 #include "volume/volume.h"
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <glm/glm.hpp>
 
+#include "hierarchy/direction_lookup.h"
 #include "shaders/shared/directions.h"
-#include "splat/direction_lookup.h"
 
 namespace freevoxel {
 namespace {

@@ -1,4 +1,4 @@
-#include "splat/direction_lookup.h"
+#include "hierarchy/direction_lookup.h"
 
 #include <cmath>
 #include <glm/common.hpp>

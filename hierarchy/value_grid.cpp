@@ -1,7 +1,7 @@
-#include "splat/value_grid.h"
+#include "hierarchy/value_grid.h"
 
 #include <algorithm>
-#include <glm/common.hpp>
+#include <glm/glm.hpp>
 
 #include "base/error.h"
 #include "base/first_exception.h"
@@ -90,6 +90,30 @@ ValueGrid valueGrid(const AttenuationFile& file) {
   failure.rethrow();
   fillAbsentBricks(grid, std::move(known), bricks, edge);
   return grid;
+}
+
+glm::dmat3 gradientFromDifferences(const ValueGrid& grid) {
+  // A gradient is a covector: it goes with the transposed inverse of the axes.
+  const glm::dmat3 worldFromIndex(grid.placement.worldFromIndex());
+  return glm::transpose(glm::inverse(worldFromIndex)) * (grid.placement.unitLength() / grid.coding.largest);
+}
+
+glm::vec3 indexGradient(const ValueGrid& grid, glm::ivec3 p) {
+  glm::vec3 gradient(0.0f);
+  for (int axis = 0; axis < 3; ++axis) {
+    glm::ivec3 low = p, high = p;
+    low[axis] = std::max(0, p[axis] - 1);
+    high[axis] = std::min(grid.dims[axis] - 1, p[axis] + 1);
+    if (low[axis] == high[axis]) continue;
+    gradient[axis] =
+        (float(grid.codes[linearIndex(high, grid.dims)]) - float(grid.codes[linearIndex(low, grid.dims)])) /
+        float(high[axis] - low[axis]);
+  }
+  return gradient;
+}
+
+glm::vec3 gradientAt(const ValueGrid& grid, glm::ivec3 p) {
+  return glm::vec3(gradientFromDifferences(grid) * glm::dvec3(indexGradient(grid, p)));
 }
 
 }  // namespace freevoxel

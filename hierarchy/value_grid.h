@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
 #include <vector>
 
 #include "hierarchy/attenuation_file.h"
@@ -22,5 +24,12 @@ struct ValueGrid {
 /// Codes over the transfer function's range.
 ValueGrid valueGrid(const Volume& volume, const TransferFunction& transfer);
 ValueGrid valueGrid(const AttenuationFile& file);
+
+/// Change of code at voxel p per voxel along each axis of the array: central differences, one-sided at the border.
+glm::vec3 indexGradient(const ValueGrid& grid, glm::ivec3 p);
+/// Takes that to change of value per shortest voxel edge, as a share of the range of codes, in world axes.
+glm::dmat3 gradientFromDifferences(const ValueGrid& grid);
+/// Both together.
+glm::vec3 gradientAt(const ValueGrid& grid, glm::ivec3 p);
 
 }  // namespace freevoxel

@@ -1,0 +1,238 @@
+// freevoxel trace: a picture of a volume in per-voxel lists, by rays.
+#include <fmt/format.h>
+
+#include <chrono>
+#include <glm/gtc/matrix_transform.hpp>
+#include <memory>
+#include <numbers>
+
+#include "app/command.h"
+#include "app/input_file.h"
+#include "app/light_options.h"
+#include "app/picture_output.h"
+#include "app/scene_file.h"
+#include "base/error.h"
+#include "gl/context.h"
+#include "hierarchy/attenuation_file.h"
+#include "hierarchy/value_grid.h"
+#include "splat/splat.h"
+#include "volume/read_volume.h"
+#include "volume/resample.h"
+#include "volume/transfer_presets.h"
+#include "voxlink/gl_buffers.h"
+#include "voxlink/voxlink.h"
+
+namespace freevoxel {
+
+namespace {
+
+constexpr int kLargestResolution = 4096;
+constexpr int kMostTurnViews = 3600;
+
+struct TraceOptions {
+  std::string input, transfer, edit;
+  PictureOptions picture;
+  VolumeOptions raw;
+  CameraOptions camera;
+  LightOptions light;
+  VoxLinkOptions voxlink;
+  Shadows shadows = Shadows::attenuation;
+  Backend backend = Backend::automatic;
+  std::optional<int> resolution;
+  int turn = 0;
+};
+
+/// What is traced: values and what they look like, before and after an edit.
+struct TracedVolume {
+  ValueGrid grid;
+  TransferFunction transfer;
+  uint64_t voxels = 0;
+};
+
+TracedVolume readFile(const TraceOptions& options, Session& session) {
+  if (hasVolumeOptions(options.raw)) throw UsageError("options for raw volumes make no sense for an .fvx file");
+  if (options.resolution) throw UsageError("--resolution needs a volume: an .fvx file has its own");
+  const AttenuationFile file(options.input);
+  TracedVolume traced;
+  traced.transfer = options.transfer.empty() ? file.transfer() : readTransferFunction(options.transfer);
+  if (traced.transfer.low != file.transfer().low || traced.transfer.high != file.transfer().high) {
+    throw InputError(fmt::format(
+        "{}: holds values from {} to {}, found a transfer function from {} to {}; trace the "
+        "volume instead",
+        options.input, file.transfer().low, file.transfer().high, traced.transfer.low, traced.transfer.high));
+  }
+  traced.grid = session.timed("read", [&] { return valueGrid(file); });
+  return traced;
+}
+
+TracedVolume readVolumeToTrace(const TraceOptions& options, Session& session) {
+  if (options.transfer.empty()) {
+    openVolume(options.input, options.raw);  // what ails the file comes first
+    throw UsageError("--transfer is required to trace a volume");
+  }
+  Volume volume = session.timed("read", [&] { return readVolume(options.input, options.raw); });
+  TracedVolume traced;
+  traced.transfer = chooseTransfer(options.transfer, volume);
+  volume.header.labels = volume.header.labels || traced.transfer.isLabels;
+  if (options.resolution) {
+    volume =
+        session.timed("resample", [&] { return resampled(volume, resampledDims(volume.header, *options.resolution)); });
+  }
+  traced.grid = session.timed("read", [&] { return valueGrid(volume, traced.transfer); });
+  return traced;
+}
+
+/// The context to trace with; null for the CPU.
+std::unique_ptr<gl::Context> chooseContext(Backend backend) {
+  std::unique_ptr<gl::Context> context;
+  if (backend == Backend::cpu) return context;
+  try {
+    context = std::make_unique<gl::Context>();
+  } catch (const MachineError&) {
+    if (backend == Backend::gl) throw;
+  }
+  // A GL that runs on the CPU is slower there than our own code.
+  if (backend == Backend::automatic && context && context->isSoftware()) context.reset();
+  return context;
+}
+
+/// The camera turned about an axis through its target.
+Camera turned(const Camera& camera, double angle, glm::dvec3 axis) {
+  const glm::dmat3 rotation(glm::rotate(glm::dmat4(1.0), angle, axis));
+  Camera result = camera;
+  result.eye = camera.target + rotation * (camera.eye - camera.target);
+  result.up = rotation * camera.up;
+  return result;
+}
+
+/// The paper's measurement: a full turn about y, then one about x.
+void measureTurns(VoxLink& voxlink, const Camera& camera, int views, Session& session) {
+  nlohmann::ordered_json frames = nlohmann::ordered_json::array();
+  double seconds = 0.0;
+  for (const glm::dvec3 axis : {glm::dvec3(0.0, 1.0, 0.0), glm::dvec3(1.0, 0.0, 0.0)}) {
+    for (int i = 0; i < views; ++i) {
+      const Camera view = turned(camera, 2.0 * std::numbers::pi * i / views, axis);
+      const auto start = std::chrono::steady_clock::now();
+      voxlink.trace(view, session.progress());
+      const double frame = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+      frames.push_back(frame);
+      seconds += frame;
+    }
+  }
+  const double rays = double(camera.imageSize.x) * camera.imageSize.y * 2.0 * views;
+  session.statistics["frameSeconds"] = frames;
+  session.statistics["framesPerSecond"] = 2.0 * views / seconds;
+  session.statistics["raysPerSecond"] = rays / seconds;
+}
+
+void reportStatistics(const VoxLinkStatistics& done, Session& session) {
+  session.addSeconds("build", done.buildSeconds);
+  session.addSeconds("shadows", done.shadowSeconds);
+  session.addSeconds("light", done.lightSeconds);
+  session.addSeconds("trace", done.traceSeconds);
+  session.statistics["backend"] = done.backend;
+  if (!done.glRenderer.empty()) session.statistics["glRenderer"] = done.glRenderer;
+  session.statistics["voxels"] = done.voxels;
+  session.statistics["storedVoxels"] = done.storedVoxels;
+  session.statistics["bricks"] = done.bricks;
+  session.statistics["occupiedBricks"] = done.occupiedBricks;
+  session.statistics["bufferBytes"] = done.bufferBytes;
+  session.statistics["bytesPerStoredVoxel"] = double(done.bufferBytes) / double(done.storedVoxels);
+  session.statistics["builds"] = done.builds;
+  session.statistics["passes"] = done.passes;
+}
+
+Outcome trace(TraceOptions options, const CLI::App& command, Session& session) {
+  checkOutputName(options.picture);
+  if (isSceneFile(options.input)) {
+    useScene(command, {options.input, options.transfer, options.raw, options.camera, options.light, options.picture});
+  }
+  const TracedVolume traced =
+      isAttenuationFile(options.input) ? readFile(options, session) : readVolumeToTrace(options, session);
+  const Camera camera = makeCamera(options.camera, worldBounds(traced.grid.placement, traced.grid.dims));
+  const Lighting lighting = makeLighting(options.light);
+  std::optional<TransferFunction> edited;
+  if (!options.edit.empty()) {
+    edited = readTransferFunction(options.edit);
+    if (edited->low != traced.transfer.low || edited->high != traced.transfer.high ||
+        edited->isLabels != traced.transfer.isLabels) {
+      throw InputError(fmt::format("{}: expected the range of the transfer function it edits, {} to {}, found {} to {}",
+                                   options.edit, traced.transfer.low, traced.transfer.high, edited->low, edited->high));
+    }
+  }
+  const std::unique_ptr<gl::Context> context = chooseContext(options.backend);
+  VoxLink voxlink(traced.grid, traced.transfer, options.voxlink, context.get(), session.progress());
+  if (edited) voxlink.edit(traced.grid, *edited, session.progress());
+  voxlink.light(lighting, options.shadows);
+  const Image picture = voxlink.trace(camera, session.progress());
+  reportStatistics(voxlink.statistics(), session);
+  if (options.turn > 0) measureTurns(voxlink, camera, options.turn, session);
+  writePicture(options.picture, picture, session);
+  return Outcome::done;
+}
+
+double parseThreshold(std::string_view text) {
+  const double threshold = parseNumber(text);
+  if (!(threshold >= 0.0 && threshold < 1.0)) {
+    throw UsageError(fmt::format("expected 0 up to below 1, found {}", text));
+  }
+  return threshold;
+}
+
+}  // namespace
+
+Command addTrace(CLI::App& program, CommonOptions& common) {
+  auto options = std::make_shared<TraceOptions>();
+  CLI::App* command = addSubcommand(program, "trace", "trace rays through the visible voxels of a volume (VoxLink)",
+                                    "freevoxel trace cloud.nrrd --transfer cloud.json --orbit 30,20 -o cloud.png");
+  command
+      ->add_option("INPUT", options->input,
+                   "a volume, which needs --transfer, an attenuation file (.fvx), or a scene (.json)")
+      ->required();
+  addOutputOption(*command, options->picture);
+  addTransferOption(*command, options->transfer, "; for an attenuation file one of the same range (default: its own)");
+  addParsed<std::optional<int>>(
+      *command, "--resolution", options->resolution, "N",
+      fmt::format("voxels along the longest edge, 1 to {}: the volume is resampled (default: its own)",
+                  kLargestResolution),
+      [](std::string_view text) { return std::optional<int>(int(parseWhole(text, 1, kLargestResolution))); });
+  addChoice<int>(*command, "--brick", options->voxlink.brickEdge, {{"4", 4}, {"8", 8}, {"16", 16}},
+                 "voxels along the edge of a brick");
+  addParsed<double>(
+      *command, "--threshold", options->voxlink.threshold, "OPACITY",
+      fmt::format("voxels of more opacity are stored, 0 up to below 1 (default {})", options->voxlink.threshold),
+      parseThreshold);
+  addChoice<Shadows>(*command, "--shadows", options->shadows,
+                     {{"rays", Shadows::rays}, {"attenuation", Shadows::attenuation}, {"none", Shadows::none}},
+                     "what lamps lose on their way: by a ray from every stored voxel, by attenuation along lattice "
+                     "directions, or nothing");
+  command
+      ->add_option("--edit", options->edit,
+                   "build for --transfer, then show this one: voxels are stored anew only if it shows some that were "
+                   "left out")
+      ->type_name("FILE");
+  addParsed<int>(
+      *command, "--steps", options->voxlink.steps, "N",
+      fmt::format("of a ray per pass on the GPU, 1 to {} (default {})", GlVoxLink::kMostSteps, options->voxlink.steps),
+      [](std::string_view text) { return int(parseWhole(text, 1, GlVoxLink::kMostSteps)); });
+  addChoice<Backend>(*command, "--backend", options->backend,
+                     {{"auto", Backend::automatic}, {"gl", Backend::gl}, {"cpu", Backend::cpu}},
+                     "what builds and traces");
+  addParsed<uint64_t>(*command, "--gpu-memory", options->voxlink.gpuMemory, "BYTES",
+                      fmt::format("that may be allocated on the GPU; K, M, G are understood (default {}G)",
+                                  options->voxlink.gpuMemory >> 30),
+                      parseBytes);
+  addParsed<int>(*command, "--turn", options->turn, "VIEWS",
+                 fmt::format("also measure a full turn about y and one about x of so many views each, 1 to {}; times "
+                             "are in --stats",
+                             kMostTurnViews),
+                 [](std::string_view text) { return int(parseWhole(text, 1, kMostTurnViews)); });
+  addBackgroundOption(*command, options->picture);
+  addCameraOptions(*command, options->camera);
+  addLightOptions(*command, options->light);
+  addVolumeOptions(*command, options->raw);
+  addCommonOptions(*command, common);
+  return {command, [options, command](Session& session) { return trace(*options, *command, session); }};
+}
+
+}  // namespace freevoxel

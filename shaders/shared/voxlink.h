@@ -1,0 +1,134 @@
+// The VoxLink buffers, in GLSL and C++ alike (papers/voxlink section 4.1; docs/voxlink.md draws them).
+//
+//   brickWords      one per 32 bricks of the grid, x fastest: which are occupied, and how many are before them
+//   brickHeaders    per occupied brick headerWords(edge) words: its first fragment, then edge^2 lists, x fastest.
+//                   A list holds a column of voxels along z, the predominant axis: a mask of the voxels that are
+//                   filled and where their fragments start
+//   fragmentBuffer  one word per filled voxel, lists one after the other: a code of the value and a normal
+//   materialBuffer  per code: linear colour and extinction
+#ifndef FREEVOXEL_SHADERS_SHARED_VOXLINK_H
+#define FREEVOXEL_SHADERS_SHARED_VOXLINK_H
+
+#include "shaders/shared/language.h"
+
+#ifdef __cplusplus
+#include <cmath>
+#endif
+
+FREEVOXEL_BEGIN_SHARED
+
+#ifdef __cplusplus
+using std::acos;
+using std::cos;
+using std::pow;
+using std::sin;
+inline float arcTangent(float y, float x) {
+  return std::atan2(y, x);
+}
+#else
+float arcTangent(float y, float x) {
+  return atan(y, x);
+}
+#endif
+
+// 32 bricks of the grid.
+struct BrickWord {
+  uint occupied;  // bit i: brick 32 w + i holds a filled voxel
+  uint rank;      // occupied bricks in the words before
+};
+
+// A voxel's material: linear RGB and extinction per shortest voxel edge.
+struct VoxelMaterial {
+  float red, green, blue, extinction;
+};
+
+// Where a ray of the image stands between two passes.
+struct RayState {
+  float red, green, blue;  // gathered so far, premultiplied
+  float through;           // what is left of the light
+  int x, y, z;             // the voxel it enters next; x = kRayDone when there is none
+  float t;                 // where, in shortest voxel edges from the ray's origin
+};
+SHARED_CONSTANT int kRayDone = -1;
+
+// Light that a ray no longer gathers: what is behind this share adds at most half a step of an 8-bit picture.
+SHARED_CONSTANT float kOpaqueEnough = 0.000244140625f;  // 2^-12
+
+// Directions with components smaller than this are taken as this: no division by 0.
+SHARED_CONSTANT float kLeastComponent = 1e-12f;
+
+// Words of a brick's header.
+SHARED_FUNCTION int headerWords(int edge) {
+  return edge * edge + 1;
+}
+
+// A list: the lower half says which of its voxels are filled, the upper half where, from the brick's first fragment on,
+// theirs start.
+SHARED_FUNCTION uint listOf(uint mask, uint start) {
+  return mask | start << 16;
+}
+SHARED_FUNCTION uint listMask(uint list) {
+  return list & 0xffffu;
+}
+SHARED_FUNCTION uint listStart(uint list) {
+  return list >> 16;
+}
+
+// A fragment: code in the lower half, normal in the upper.
+SHARED_FUNCTION uint fragmentOf(uint code, uint normal) {
+  return code | normal << 16;
+}
+SHARED_FUNCTION uint fragmentCode(uint fragment) {
+  return fragment & 0xffffu;
+}
+SHARED_FUNCTION uint fragmentNormal(uint fragment) {
+  return fragment >> 16;
+}
+
+// Normals are polar, 16 bits: 7 of the angle from z, 7 of the angle about it, and 2 of how much of a surface it is,
+// 0 to 3 (base/light.h: where values hardly change there is none).
+SHARED_CONSTANT float kPi = 3.14159265f;
+SHARED_FUNCTION uint packNormal(float x, float y, float z, float surface) {
+  float size = max(max(max(x, -x), max(y, -y)), max(z, -z));
+  if (!(size > 0.0f) || !(surface > 0.0f)) return 0u;
+  float sum = (x * x + y * y + z * z) / (size * size);
+  float cosine = z / size * (1.0f / pow(sum, 0.5f));
+  uint polar = uint(acos(min(max(cosine, -1.0f), 1.0f)) * (127.0f / kPi) + 0.5f);
+  // At the poles there is no azimuth, and GLSL leaves it open which one it tells.
+  float across = max(max(x, -x), max(y, -y)) / size;
+  float turn = across < 1e-6f ? 0.0f : arcTangent(y / size, x / size) * (64.0f / kPi);
+  uint azimuth = uint(turn < 0.0f ? turn + 128.5f : turn + 0.5f) & 127u;
+  uint strength = uint(min(surface, 1.0f) * 3.0f + 0.5f);
+  return polar | azimuth << 7 | strength << 14;
+}
+SHARED_FUNCTION void unpackNormal(uint packed_, SHARED_OUT(float) x, SHARED_OUT(float) y, SHARED_OUT(float) z,
+                                  SHARED_OUT(float) surface) {
+  float polar = float(packed_ & 127u) * (kPi / 127.0f);
+  float azimuth = float(packed_ >> 7 & 127u) * (kPi / 64.0f);
+  x = sin(polar) * cos(azimuth);
+  y = sin(polar) * sin(azimuth);
+  z = cos(polar);
+  surface = float(packed_ >> 14) * (1.0f / 3.0f);
+}
+
+// Light at a voxel in one word: three numbers of 9 bits with one exponent, 0 to 2^15.
+SHARED_FUNCTION uint packLight(float red, float green, float blue) {
+  float most = min(max(max(red, green), blue), 32768.0f);
+  if (!(most > 0.0000305f)) return 0u;
+  int exponent = max(int(floatBitsToUint(most * 1.00098f) >> 23) - 126, -15);
+  float scale = uintBitsToFloat(uint(127 + 9 - exponent) << 23);
+  uint r = uint(min(max(red, 0.0f) * scale + 0.5f, 511.0f));
+  uint g = uint(min(max(green, 0.0f) * scale + 0.5f, 511.0f));
+  uint b = uint(min(max(blue, 0.0f) * scale + 0.5f, 511.0f));
+  return r | g << 9 | b << 18 | uint(exponent + 15) << 27;
+}
+SHARED_FUNCTION void unpackLight(uint light, SHARED_OUT(float) red, SHARED_OUT(float) green, SHARED_OUT(float) blue) {
+  float scale = uintBitsToFloat(((light >> 27) + uint(127 - 9 - 15)) << 23);
+  red = float(light & 511u) * scale;
+  green = float(light >> 9 & 511u) * scale;
+  blue = float(light >> 18 & 511u) * scale;
+}
+
+FREEVOXEL_END_SHARED
+
+#endif

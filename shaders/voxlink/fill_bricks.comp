@@ -1,0 +1,57 @@
+// Writes headers and fragments of the occupied bricks of a layer.
+layout(local_size_x = 64) in;
+
+#include "shaders/voxlink/slab.glsl"
+
+layout(std430, binding = 2) readonly buffer Before { uvec2 before[]; };
+layout(std430, binding = 3) writeonly buffer BrickHeaders { uint brickHeaders[]; };
+layout(std430, binding = 4) writeonly buffer Fragments { uint fragmentBuffer[]; };
+
+layout(location = 4) uniform mat3 gradientMatrix;
+layout(location = 5) uniform float surfaceGradient;
+
+shared uint filled[64];
+
+float difference(ivec3 voxel, int axis) {
+  ivec3 low = voxel, high = voxel;
+  low[axis] = max(0, voxel[axis] - 1);
+  high[axis] = min(dims[axis] - 1, voxel[axis] + 1);
+  if (low[axis] == high[axis]) return 0.0;
+  return (float(codeAt(high)) - float(codeAt(low))) / float(high[axis] - low[axis]);
+}
+
+void main() {
+  uint index = brickIndex();
+  uvec2 start = before[index];
+  if (before[index + 1u].x == start.x) return;  // the whole group
+  uint local = gl_LocalInvocationIndex;
+  ivec3 origin = brickOrigin();
+  int columns = edge * edge;
+  int perInvocation = (columns + 63) / 64;
+  int first = int(local) * perInvocation, end = min(first + perInvocation, columns);
+  uint own = 0u;
+  for (int column = first; column < end; ++column)
+    own += uint(bitCount(columnMask(origin, column)));
+  filled[local] = own;
+  barrier();
+  for (uint reach = 1u; reach < 64u; reach *= 2u) {
+    uint sum = local >= reach ? filled[local - reach] : 0u;
+    barrier();
+    filled[local] += sum;
+    barrier();
+  }
+  uint at = filled[local] - own;
+  uint header = start.x * uint(headerWords(edge));
+  if (local == 0u) brickHeaders[header] = start.y;
+  for (int column = first; column < end; ++column) {
+    uint mask = columnMask(origin, column);
+    brickHeaders[header + 1u + uint(column)] = listOf(mask, at);
+    for (; mask != 0u; mask &= mask - 1u) {
+      ivec3 voxel = origin + ivec3(column % edge, column / edge, findLSB(mask));
+      vec3 gradient = gradientMatrix * vec3(difference(voxel, 0), difference(voxel, 1), difference(voxel, 2));
+      uint normal = packNormal(gradient.x, gradient.y, gradient.z, length(gradient) / surfaceGradient);
+      fragmentBuffer[start.y + at] = fragmentOf(codeAt(voxel), normal);
+      ++at;
+    }
+  }
+}

@@ -1,0 +1,122 @@
+// Sparse volumes in per-voxel lists: the VoxLink buffer (papers/voxlink sections 3.1.3 and 4.1; docs/voxlink.md).
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <glm/mat3x3.hpp>
+#include <glm/vec3.hpp>
+#include <optional>
+#include <vector>
+
+#include "base/error.h"
+#include "base/grid.h"
+#include "base/placement.h"
+#include "hierarchy/value_grid.h"
+#include "shaders/shared/voxlink.h"
+#include "volume/transfer_function.h"
+
+namespace freevoxel {
+
+using shared::BrickWord;
+using shared::RayState;
+using shared::VoxelMaterial;
+static_assert(sizeof(BrickWord) == 8 && offsetof(BrickWord, rank) == 4);
+static_assert(sizeof(VoxelMaterial) == 16 && offsetof(VoxelMaterial, extinction) == 12);
+static_assert(sizeof(RayState) == 32 && offsetof(RayState, through) == 12 && offsetof(RayState, x) == 16 &&
+              offsetof(RayState, t) == 28);
+
+/// The grid of bricks that covers the stored voxels. Bricks are aligned to multiples of their edge.
+struct BrickGrid {
+  int edge = 8;                ///< voxels: 4, 8 or 16
+  glm::ivec3 low{0}, high{0};  ///< box fitted to the stored voxels, in voxels; high exclusive
+  glm::ivec3 first{0};         ///< brick that holds voxel low
+  glm::ivec3 count{0};         ///< bricks along each axis
+
+  uint64_t bricks() const { return voxelCount(count); }
+  /// Of a brick in the grid, x fastest.
+  uint64_t index(glm::ivec3 brick) const { return linearIndex(brick - first, count); }
+};
+
+/// The smallest grid round a box that is not empty. Throws InputError unless edge is 4, 8 or 16.
+BrickGrid brickGrid(int edge, glm::ivec3 low, glm::ivec3 high);
+/// Throws InputError unless edge is 4, 8 or 16.
+void checkBrickEdge(int edge);
+
+/// A volume's voxels whose opacity is above a threshold.
+/// Invariant: brickWords has one word per 32 bricks of the grid; brickHeaders has occupied bricks * headerWords(edge)
+/// words in the order of the grid; fragments are in the order of headers, lists and z.
+struct VoxLinkBuffers {
+  glm::ivec3 dims{0};  ///< of the volume
+  Placement placement;
+  BrickGrid grid;
+  std::vector<BrickWord> brickWords;
+  std::vector<uint32_t> brickHeaders;
+  std::vector<uint32_t> fragments;  ///< one per stored voxel
+
+  uint64_t occupiedBricks() const { return brickHeaders.size() / size_t(shared::headerWords(grid.edge)); }
+  /// Of all buffers, the materials for `codes` codes among them.
+  uint64_t bytes(size_t codes) const {
+    return brickWords.size() * sizeof(BrickWord) + (brickHeaders.size() + fragments.size()) * sizeof(uint32_t) +
+           codes * sizeof(VoxelMaterial);
+  }
+
+  /// Header of the brick at a brick position inside the grid; null if it is empty.
+  const uint32_t* header(glm::ivec3 brick) const {
+    const uint64_t at = grid.index(brick);
+    const BrickWord& word = brickWords[at >> 5];
+    const uint32_t bit = uint32_t(at & 31u);
+    if ((word.occupied >> bit & 1u) == 0) return nullptr;
+    const uint32_t rank = word.rank + uint32_t(std::popcount(word.occupied & ((1u << bit) - 1u)));
+    return brickHeaders.data() + size_t(rank) * size_t(shared::headerWords(grid.edge));
+  }
+  /// Fragment of a voxel of the volume; nothing if it is not stored.
+  std::optional<uint32_t> find(glm::ivec3 voxel) const;
+};
+
+/// Per code: whether voxels of it are stored, which is whether their opacity (per reference length) is above the
+/// threshold, 0 <= threshold < 1.
+std::vector<uint8_t> storedCodes(const TransferFunction& transfer, const ValueCoding& coding, double threshold);
+
+/// Colour and extinction of every code; those not stored are invisible.
+std::vector<VoxelMaterial> voxelMaterials(const TransferFunction& transfer, const ValueCoding& coding,
+                                          const std::vector<uint8_t>& stored);
+
+/// Whether another set of stored codes needs other buffers: it has a code that occurs in the volume and is not in the
+/// set that the buffers were built for.
+bool needsRebuild(const ValueGrid& grid, const std::vector<uint8_t>& built, const std::vector<uint8_t>& wanted);
+
+/// Plain C++: counts, then fills. `stored` has one entry per code. Same bytes for any thread count.
+/// Throws InputError for a brick edge other than 4, 8, 16 and if nothing is stored.
+VoxLinkBuffers buildBuffers(const ValueGrid& grid, const std::vector<uint8_t>& stored, int brickEdge);
+
+/// The packed normal of a voxel (shared::packNormal): gradientAt's direction and strength. `gradientMatrix` is
+/// gradientFromDifferences.
+uint32_t voxelNormal(const ValueGrid& grid, const glm::mat3& gradientMatrix, glm::ivec3 voxel);
+
+/// What to throw if no voxel is stored.
+InputError nothingStored();
+/// Throws InputError if so many fragments have no 32-bit index.
+void checkFragmentCount(uint64_t fragments);
+
+/// Calls f(fragment index, voxel) for every stored voxel, bricks in parallel.
+template <class F>
+void forEachStoredVoxel(const VoxLinkBuffers& buffers, F&& f) {
+  const BrickGrid& grid = buffers.grid;
+#pragma omp parallel for schedule(dynamic, 64)
+  for (int64_t at = 0; at < int64_t(grid.bricks()); ++at) {
+    const glm::ivec3 brick = grid.first + glm::ivec3(int(at % grid.count.x), int(at / grid.count.x % grid.count.y),
+                                                     int(at / (int64_t(grid.count.x) * grid.count.y)));
+    const uint32_t* header = buffers.header(brick);
+    if (header == nullptr) continue;
+    for (int column = 0; column < grid.edge * grid.edge; ++column) {
+      const uint32_t list = header[1 + column];
+      size_t fragment = size_t(header[0]) + shared::listStart(list);
+      for (uint32_t mask = shared::listMask(list); mask != 0; mask &= mask - 1) {
+        f(fragment++, brick * grid.edge + glm::ivec3(column % grid.edge, column / grid.edge, std::countr_zero(mask)));
+      }
+    }
+  }
+}
+
+}  // namespace freevoxel
