@@ -3,10 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
-#include <exception>
-#include <mutex>
 #include <utility>
 
+#include "base/first_exception.h"
 #include "base/grid.h"
 #include "precompute/checksums.h"
 #include "precompute/hilbert.h"
@@ -16,27 +15,6 @@ namespace freevoxel {
 namespace {
 
 constexpr size_t kBricksPerCodeWrite = 16;
-
-/// Lets parallel loops end before the first of their exceptions goes on.
-class FirstException {
- public:
-  template <class F>
-  void guard(F&& f) noexcept {
-    try {
-      f();
-    } catch (...) {
-      const std::lock_guard lock(mutex_);
-      if (!first_) first_ = std::current_exception();
-    }
-  }
-  void rethrow() const {
-    if (first_) std::rethrow_exception(first_);
-  }
-
- private:
-  std::mutex mutex_;
-  std::exception_ptr first_;
-};
 
 /// Writes the part of a volume in x order that belongs to one brick into the brick's plane, edge^3 entries in curve
 /// order. `source`: the entry of the brick's first voxel, in an array of planes of dims.x * dims.y entries. `extent`:
@@ -70,13 +48,14 @@ BrickWriter::BrickWriter(AtomicFile& file, const BrickOffsets& offsets, std::spa
   size_t largestSlab = 0;
   for (size_t i = 0; i < bricks.size(); ++i) {
     entries_.push_back({bricks[i].hilbertIndex, bricks[i].visibleVoxels, 0, 0, 0, 0});
-    steps_.push_back(hilbertSteps(hilbertState(bricks[i].position, order), std::countr_zero(unsigned(edge))));
+    states_.push_back(hilbertState(bricks[i].position, order));
+    steps_.push_back(hilbertSteps(states_.back(), std::countr_zero(unsigned(edge))));
     auto& slab = slabs_[size_t(bricks[i].position.z)];
     slab.push_back(i);
     largestSlab = std::max(largestSlab, slab.size());
   }
   for (auto& planes : planes_)
-    planes.resize(largestSlab * kDirectionsPerSection * brickVoxels());
+    planes.resize(largestSlab * kDirectionsPerSection * brickVoxels() / sizeof(Line));
 }
 
 void BrickWriter::writeCodes(std::span<const uint16_t> codes, const ValueCoding& coding) {
@@ -108,23 +87,20 @@ void BrickWriter::writeCodesAs(std::span<const uint16_t> codes) {
   failure.rethrow();
 }
 
-void BrickWriter::receive(const AttenuationSlab& slab) {
-  const std::vector<size_t>& bricks = bricksAt(slab.firstPlane);
-  const std::span<uint8_t> planes(planes_[size_t(sweepPass(slab.direction))]);
-  for (size_t b = 0; b < bricks.size(); ++b) {
-    const size_t i = bricks[b];
-    const glm::ivec3 position = bricks_[i].position;
-    const uint8_t* source = slab.bytes.data() + linearIndex({position.x * edge_, position.y * edge_, 0}, dims_);
-    const uint64_t plane = b * kDirectionsPerSection + uint64_t(slab.direction % kDirectionsPerSection);
-    permuteBrick(source, dims_, brickExtent(position, dims_, edge_), edge_, steps_[i], kAttenuationOutside,
-                 planes.subspan(plane * brickVoxels(), brickVoxels()).data());
+std::span<const BrickPlanes> BrickWriter::begin(int pass, int slab) {
+  auto& wanted = wanted_[size_t(pass)];
+  wanted.clear();
+  uint8_t* planes = planes_[size_t(pass)].data()->bytes;
+  for (const size_t i : slabs_[size_t(slab)]) {
+    wanted.push_back({bricks_[i].position, states_[i], planes});
+    planes += kDirectionsPerSection * brickVoxels();
   }
-  advanced_(slab.bytes.size());
+  return wanted;
 }
 
-void BrickWriter::complete(int pass, int firstPlane) {
+void BrickWriter::complete(int pass, int slab) {
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<size_t>& bricks = bricksAt(firstPlane);
+  const std::vector<size_t>& bricks = slabs_[size_t(slab)];
   const uint64_t brickBytes = kDirectionsPerSection * brickVoxels();
   const auto hash = pass == 0 ? &BrickEntry::backwardHash : &BrickEntry::forwardHash;
   const uint64_t sectionOffset = pass == 0 ? offsets_.backward : offsets_.forward;
@@ -132,12 +108,14 @@ void BrickWriter::complete(int pass, int firstPlane) {
 #pragma omp parallel for schedule(dynamic, 4)
   for (size_t b = 0; b < bricks.size(); ++b) {
     failure.guard([&] {
-      const auto bytes = std::as_bytes(std::span(planes_[size_t(pass)])).subspan(b * brickBytes, brickBytes);
+      const auto bytes = std::as_bytes(std::span(wanted_[size_t(pass)][b].planes, brickBytes));
       entries_[bricks[b]].*hash = contentHash(bytes);
       file_.writeAt(sectionOffset + bricks[b] * brickBytes, bytes);
     });
   }
   failure.rethrow();
+  const glm::ivec3 slabDims(dims_.x, dims_.y, std::min(edge_, dims_.z - slab * edge_));
+  advanced_(voxelCount(slabDims) * kDirectionsPerSection);
   writeSeconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -1,4 +1,5 @@
-// Brick data on their way into the file: permuted to curve order, hashed and written, a slab of bricks at a time.
+// Brick data on their way into the file: codes permuted to curve order, all hashed and written, a slab of bricks at a
+// time.
 #pragma once
 
 #include <array>
@@ -27,17 +28,17 @@ struct BrickOffsets {
 /// bytes per voxel, so that the 13 planes of a brick go to the file in one piece.
 class BrickWriter final : public AttenuationSink {
  public:
-  /// `bricks` in file order. `advanced`, from many threads at once, is told of every slab and direction how many voxels
-  /// it has. All arguments must outlive the writer.
+  /// `bricks` in file order. `advanced` is told of every slab and pass how many voxels, once for each direction, are
+  /// done. All arguments must outlive the writer.
   BrickWriter(AtomicFile& file, const BrickOffsets& offsets, std::span<const StoredBrick> bricks, glm::ivec3 dims,
               int edge, std::function<void(uint64_t)> advanced);
 
   /// Section CODE. Throws MachineError.
   void writeCodes(std::span<const uint16_t> codes, const ValueCoding& coding);
 
-  void receive(const AttenuationSlab& slab) override;
+  std::span<const BrickPlanes> begin(int pass, int slab) override;
   /// Throws MachineError.
-  void complete(int pass, int firstPlane) override;
+  void complete(int pass, int slab) override;
 
   /// The section BRIK; complete once all else is written.
   std::span<const BrickEntry> entries() const { return entries_; }
@@ -46,7 +47,6 @@ class BrickWriter final : public AttenuationSink {
 
  private:
   uint64_t brickVoxels() const { return uint64_t(edge_) * uint64_t(edge_) * uint64_t(edge_); }
-  const std::vector<size_t>& bricksAt(int firstPlane) const { return slabs_[size_t(firstPlane / edge_)]; }
   template <class Code>
   void writeCodesAs(std::span<const uint16_t> codes);
 
@@ -57,9 +57,15 @@ class BrickWriter final : public AttenuationSink {
   int edge_;
   std::function<void(uint64_t)> advanced_;
   std::vector<BrickEntry> entries_;
-  std::vector<std::span<const uint16_t>> steps_;           ///< hilbertSteps of each brick
-  std::vector<std::vector<size_t>> slabs_;                 ///< bricks by their z, in file order
-  std::array<std::vector<uint8_t>, kSweepPasses> planes_;  ///< of one slab of bricks: 13 planes each
+  std::vector<std::span<const uint16_t>> steps_;  ///< hilbertSteps of each brick
+  std::vector<int> states_;                       ///< hilbertState of each brick
+  std::vector<std::vector<size_t>> slabs_;        ///< bricks by their z, in file order
+  /// Of one slab of bricks: 13 planes each.
+  struct alignas(kBrickPlaneAlignment) Line {
+    uint8_t bytes[kBrickPlaneAlignment];
+  };
+  std::array<std::vector<Line>, kSweepPasses> planes_;
+  std::array<std::vector<BrickPlanes>, kSweepPasses> wanted_;
   double writeSeconds_ = 0.0;
 };
 

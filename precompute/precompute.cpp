@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <mutex>
 #include <new>
 #include <span>
 #include <vector>
@@ -87,20 +86,6 @@ double largestCodingError(const Volume& volume, std::span<const uint16_t> codes,
   });
 }
 
-/// Passes on what many threads report.
-class SharedProgress {
- public:
-  explicit SharedProgress(Progress& progress) : progress_(progress) {}
-  void advance(uint64_t steps) {
-    const std::lock_guard lock(mutex_);
-    progress_.advance(steps);
-  }
-
- private:
-  Progress& progress_;
-  std::mutex mutex_;
-};
-
 SectionPlan planSections(const PrecomputeOptions& options, const ValueCoding& coding, uint64_t bricks,
                          const std::string& transferText) {
   const uint64_t brickVoxels = uint64_t(options.brickEdge) * uint64_t(options.brickEdge) * uint64_t(options.brickEdge);
@@ -165,15 +150,15 @@ void writeFile(const Volume& volume, const TransferFunction& transfer, std::span
   AtomicFile file(path);
   file.reserve(plan.fileBytes());
 
-  SharedProgress sharedProgress(progress);
-  BrickWriter writer(
-      file, {plan[section::kCodes].offset, plan[section::kBackward].offset, plan[section::kForward].offset}, bricks,
-      volume.header.dims, options.brickEdge, [&](uint64_t voxels) { sharedProgress.advance(voxels); });
+  BrickWriter writer(file,
+                     {plan[section::kCodes].offset, plan[section::kBackward].offset, plan[section::kForward].offset},
+                     bricks, volume.header.dims, options.brickEdge, [&](uint64_t voxels) { progress.advance(voxels); });
   writer.writeCodes(codes, coding);
   const auto segments = makeSegmentDepth(options.classification, transfer, coding);
   progress.begin("attenuation", volume.header.voxels() * shared::kDirectionCount, "voxels");
   const auto sweepStart = Clock::now();
-  sweepAttenuation(codes, volume.header.dims, *segments, options.brickEdge, writer);
+  StoredCodePlanes planes(codes, volume.header.dims);
+  sweepAttenuation(planes, volume.header.dims, options.brickEdge, *segments, writer);
   result.sweepSeconds = secondsSince(sweepStart) - writer.writeSeconds();
   progress.end();
 

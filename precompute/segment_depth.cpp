@@ -16,9 +16,9 @@ class VoxelSegments final : public SegmentDepth {
   }
 
   void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const override {
-    for (size_t x = 0; x < codes.size(); ++x)
-      depths[x] = depths_[nextCodes[x]];
+    lookUpDepths(depths_.data(), nextCodes.data(), codes.size(), depths);
   }
+  bool isOfNeighbourOnly() const override { return true; }
 
  private:
   std::vector<FixedDepth> depths_;
@@ -74,8 +74,7 @@ class PreintegratedSegments final : public SegmentDepth {
 
   void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const override {
     if (!pairs_.empty()) {
-      for (size_t x = 0; x < codes.size(); ++x)
-        depths[x] = pairs_[size_t(codes[x]) * 256 + nextCodes[x]];
+      lookUpDepthPairs(pairs_.data(), codes.data(), nextCodes.data(), codes.size(), depths);
     } else {
       for (size_t x = 0; x < codes.size(); ++x)
         depths[x] = segment(codes[x], nextCodes[x]);

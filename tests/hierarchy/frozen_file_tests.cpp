@@ -1,9 +1,6 @@
 // Files written by earlier versions stay readable, byte for byte. One file per version of the format, never rewritten.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <array>
-
 #include "hierarchy/attenuation_file.h"
 #include "precompute/sweep.h"
 #include "shaders/shared/directions.h"
@@ -37,11 +34,8 @@ TEST(FrozenFile, version1) {
   ASSERT_EQ(file.brickCount(), 2u);
 
   const auto codes = encodeValues(volume, file.coding());
-  std::array<std::vector<uint8_t>, shared::kDirectionCount> planes;
-  test::FunctionSink sink([&](const AttenuationSlab& slab) {
-    planes[size_t(slab.direction)].assign(slab.bytes.begin(), slab.bytes.end());
-  });
-  sweepAttenuation(codes, dims, *makeSegmentDepth(Classification::voxel, transfer, file.coding()), dims.z, sink);
+  const auto segments = makeSegmentDepth(Classification::voxel, transfer, file.coding());
+  const test::Planes planes = test::sweepAll(codes, dims, *segments);
   for (size_t b = 0; b < file.brickCount(); ++b) {
     const BrickView brick = file.brick(b);
     for (size_t step = 0; step < brick.curve.size(); ++step) {
