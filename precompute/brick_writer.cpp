@@ -14,8 +14,6 @@ namespace freevoxel {
 
 namespace {
 
-constexpr size_t kBricksPerCodeWrite = 16;
-
 /// Writes the part of a volume in x order that belongs to one brick into the brick's plane, edge^3 entries in curve
 /// order. `source`: the entry of the brick's first voxel, in an array of planes of dims.x * dims.y entries. `extent`:
 /// voxels of the brick inside the volume; the others become `outside`.
@@ -45,43 +43,39 @@ BrickWriter::BrickWriter(AtomicFile& file, const BrickOffsets& offsets, std::spa
       advanced_(std::move(advanced)),
       slabs_(size_t(brickDims(dims, edge).z)) {
   const int order = brickCurveOrder(dims, edge);
-  size_t largestSlab = 0;
   for (size_t i = 0; i < bricks.size(); ++i) {
     entries_.push_back({bricks[i].hilbertIndex, bricks[i].visibleVoxels, 0, 0, 0, 0});
     states_.push_back(hilbertState(bricks[i].position, order));
     steps_.push_back(hilbertSteps(states_.back(), std::countr_zero(unsigned(edge))));
     auto& slab = slabs_[size_t(bricks[i].position.z)];
     slab.push_back(i);
-    largestSlab = std::max(largestSlab, slab.size());
+    largestSlab_ = std::max(largestSlab_, slab.size());
   }
-  for (auto& planes : planes_)
-    planes.resize(largestSlab * kDirectionsPerSection * brickVoxels() / sizeof(Line));
 }
 
-void BrickWriter::writeCodes(std::span<const uint16_t> codes, const ValueCoding& coding) {
+void BrickWriter::writeCodes(int slab, std::span<const uint16_t> codes, const ValueCoding& coding) {
   if (coding.bytes() == 1) {
-    writeCodesAs<uint8_t>(codes);
+    writeCodesAs<uint8_t>(slab, codes);
   } else {
-    writeCodesAs<uint16_t>(codes);
+    writeCodesAs<uint16_t>(slab, codes);
   }
 }
 
 template <class Code>
-void BrickWriter::writeCodesAs(std::span<const uint16_t> codes) {
+void BrickWriter::writeCodesAs(int slab, std::span<const uint16_t> codes) {
+  const std::vector<size_t>& bricks = slabs_[size_t(slab)];
+  const uint64_t brickBytes = brickVoxels() * sizeof(Code);
   FirstException failure;
-#pragma omp parallel for schedule(dynamic)
-  for (size_t first = 0; first < bricks_.size(); first += kBricksPerCodeWrite) {
+#pragma omp parallel for schedule(dynamic, 4)
+  for (size_t b = 0; b < bricks.size(); ++b) {
     failure.guard([&] {
-      const size_t last = std::min(first + kBricksPerCodeWrite, bricks_.size());
-      std::vector<Code> planes((last - first) * brickVoxels());
-      for (size_t i = first; i < last; ++i) {
-        const glm::ivec3 extent = brickExtent(bricks_[i].position, dims_, edge_);
-        const std::span<Code> plane = std::span(planes).subspan((i - first) * brickVoxels(), brickVoxels());
-        permuteBrick(codes.data() + linearIndex(bricks_[i].position * edge_, dims_), dims_, extent, edge_, steps_[i],
-                     Code(0), plane.data());
-        entries_[i].codesHash = contentHash(std::as_bytes(plane));
-      }
-      file_.writeAt(offsets_.codes + first * brickVoxels() * sizeof(Code), std::as_bytes(std::span(planes)));
+      const size_t i = bricks[b];
+      const glm::ivec3 position = bricks_[i].position;
+      std::vector<Code> plane(brickVoxels());
+      permuteBrick(codes.data() + linearIndex({position.x * edge_, position.y * edge_, 0}, dims_), dims_,
+                   brickExtent(position, dims_, edge_), edge_, steps_[i], Code(0), plane.data());
+      entries_[i].codesHash = contentHash(std::as_bytes(std::span(plane)));
+      file_.writeAt(offsets_.codes + i * brickBytes, std::as_bytes(std::span(plane)));
     });
   }
   failure.rethrow();
@@ -90,6 +84,7 @@ void BrickWriter::writeCodesAs(std::span<const uint16_t> codes) {
 std::span<const BrickPlanes> BrickWriter::begin(int pass, int slab) {
   auto& wanted = wanted_[size_t(pass)];
   wanted.clear();
+  planes_[size_t(pass)].resize(passBytes() / sizeof(Line));
   uint8_t* planes = planes_[size_t(pass)].data()->bytes;
   for (const size_t i : slabs_[size_t(slab)]) {
     wanted.push_back({bricks_[i].position, states_[i], planes});
@@ -115,6 +110,8 @@ void BrickWriter::complete(int pass, int slab) {
   }
   failure.rethrow();
   const glm::ivec3 slabDims(dims_.x, dims_.y, std::min(edge_, dims_.z - slab * edge_));
+  const bool last = pass == 0 ? size_t(slab) + 1 == slabs_.size() : slab == 0;
+  if (last) planes_[size_t(pass)] = {};
   advanced_(voxelCount(slabDims) * kDirectionsPerSection);
   writeSeconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

@@ -24,8 +24,8 @@ struct BrickOffsets {
   uint64_t forward = 0;
 };
 
-/// Writes the sections CODE, ATTB and ATTF, every byte of them once. Holds the attenuation of two slabs of bricks, 26
-/// bytes per voxel, so that the 13 planes of a brick go to the file in one piece.
+/// Writes the sections CODE, ATTB and ATTF, every byte of them once. Holds the attenuation of a slab of bricks
+/// for each pass under way, 13 bytes per voxel, so that the 13 planes of a brick go to the file in one piece.
 class BrickWriter final : public AttenuationSink {
  public:
   /// `bricks` in file order. `advanced` is told of every slab and pass how many voxels, once for each direction, are
@@ -33,13 +33,15 @@ class BrickWriter final : public AttenuationSink {
   BrickWriter(AtomicFile& file, const BrickOffsets& offsets, std::span<const StoredBrick> bricks, glm::ivec3 dims,
               int edge, std::function<void(uint64_t)> advanced);
 
-  /// Section CODE. Throws MachineError.
-  void writeCodes(std::span<const uint16_t> codes, const ValueCoding& coding);
+  /// One slab's share of section CODE: `codes` are those of its planes. Throws MachineError.
+  void writeCodes(int slab, std::span<const uint16_t> codes, const ValueCoding& coding);
 
   std::span<const BrickPlanes> begin(int pass, int slab) override;
   /// Throws MachineError.
   void complete(int pass, int slab) override;
 
+  /// Bytes of the planes of one pass.
+  uint64_t passBytes() const { return largestSlab_ * kDirectionsPerSection * brickVoxels(); }
   /// The section BRIK; complete once all else is written.
   std::span<const BrickEntry> entries() const { return entries_; }
   /// Spent writing attenuation, by the clock.
@@ -48,7 +50,7 @@ class BrickWriter final : public AttenuationSink {
  private:
   uint64_t brickVoxels() const { return uint64_t(edge_) * uint64_t(edge_) * uint64_t(edge_); }
   template <class Code>
-  void writeCodesAs(std::span<const uint16_t> codes);
+  void writeCodesAs(int slab, std::span<const uint16_t> codes);
 
   AtomicFile& file_;
   BrickOffsets offsets_;
@@ -60,6 +62,7 @@ class BrickWriter final : public AttenuationSink {
   std::vector<std::span<const uint16_t>> steps_;  ///< hilbertSteps of each brick
   std::vector<int> states_;                       ///< hilbertState of each brick
   std::vector<std::vector<size_t>> slabs_;        ///< bricks by their z, in file order
+  size_t largestSlab_ = 0;                        ///< bricks
   /// Of one slab of bricks: 13 planes each.
   struct alignas(kBrickPlaneAlignment) Line {
     uint8_t bytes[kBrickPlaneAlignment];

@@ -333,6 +333,9 @@ void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const Segmen
       if ((passes >> pass & 1u) != 0) sink.complete(pass, slabs[pass]);
     }
   }
+  for (int pass = 0; pass < kSweepPasses; ++pass) {
+    if ((passes >> pass & 1u) != 0) codes.release(pass);
+  }
 }
 
 uint64_t sweepBytes(glm::ivec3 dims, int edge, int passCount, int threads) {

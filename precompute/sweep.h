@@ -33,6 +33,8 @@ class CodePlanes {
   virtual ~CodePlanes() = default;
   /// Codes of planes first..first+count-1, x fastest, until the next call for the same pass. Called from one thread.
   virtual std::span<const uint16_t> planes(int pass, int first, int count) = 0;
+  /// No more planes are asked for by this pass.
+  virtual void release(int /*pass*/) {}
 };
 
 /// All codes in memory.
