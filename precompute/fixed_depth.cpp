@@ -13,37 +13,39 @@ namespace freevoxel {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Whole vectors of look-ups; the rest one by one.
-template <class Index, class IndexOf>
-HWY_INLINE void lookUp(const FixedDepth* HWY_RESTRICT table, size_t count, const Index& vectorIndex,
-                       const IndexOf& index, FixedDepth* HWY_RESTRICT depths) {
+void lookUpRow(const FixedDepth* HWY_RESTRICT table, const uint16_t* HWY_RESTRICT codes, size_t count,
+               FixedDepth* HWY_RESTRICT depths) {
   const hn::ScalableTag<uint32_t> tag;
+  const hn::RebindToSigned<decltype(tag)> integers;
+  const hn::Rebind<uint16_t, decltype(integers)> halves;
   size_t i = 0;
-  for (; i + hn::Lanes(tag) <= count; i += hn::Lanes(tag))
-    hn::StoreU(hn::GatherIndex(tag, table, vectorIndex(i)), tag, depths + i);
+  for (; i + hn::Lanes(tag) <= count; i += hn::Lanes(tag)) {
+    const auto index = hn::PromoteTo(integers, hn::LoadU(halves, codes + i));
+    hn::StoreU(hn::GatherIndex(tag, table, index), tag, depths + i);
+  }
   for (; i < count; ++i)
-    depths[i] = table[index(i)];
+    depths[i] = table[codes[i]];
 }
 
-void lookUpRow(const FixedDepth* table, const uint16_t* codes, size_t count, FixedDepth* depths) {
-  const hn::RebindToSigned<hn::ScalableTag<uint32_t>> integers;
+void lookUpPairRow(const FixedDepth* HWY_RESTRICT table, const uint16_t* HWY_RESTRICT codes,
+                   const uint16_t* HWY_RESTRICT nextCodes, size_t count, uint16_t firstVisible,
+                   FixedDepth* HWY_RESTRICT depths) {
+  const hn::ScalableTag<uint32_t> tag;
+  const hn::RebindToSigned<decltype(tag)> integers;
   const hn::Rebind<uint16_t, decltype(integers)> halves;
-  lookUp(
-      table, count, [&](size_t i) { return hn::PromoteTo(integers, hn::LoadU(halves, codes + i)); },
-      [&](size_t i) { return codes[i]; }, depths);
-}
-
-void lookUpPairRow(const FixedDepth* table, const uint16_t* codes, const uint16_t* nextCodes, size_t count,
-                   FixedDepth* depths) {
-  const hn::RebindToSigned<hn::ScalableTag<uint32_t>> integers;
-  const hn::Rebind<uint16_t, decltype(integers)> halves;
-  lookUp(
-      table, count,
-      [&](size_t i) {
-        const auto pair = hn::Or(hn::ShiftLeft<8>(hn::LoadU(halves, codes + i)), hn::LoadU(halves, nextCodes + i));
-        return hn::PromoteTo(integers, pair);
-      },
-      [&](size_t i) { return size_t(codes[i]) * 256 + nextCodes[i]; }, depths);
+  const auto visible = hn::Set(integers, firstVisible);
+  size_t i = 0;
+  for (; i + hn::Lanes(tag) <= count; i += hn::Lanes(tag)) {
+    const auto own = hn::PromoteTo(integers, hn::LoadU(halves, codes + i));
+    const auto next = hn::PromoteTo(integers, hn::LoadU(halves, nextCodes + i));
+    if (hn::AllTrue(integers, hn::Lt(hn::Max(own, next), visible))) {
+      hn::StoreU(hn::Zero(tag), tag, depths + i);
+    } else {
+      hn::StoreU(hn::GatherIndex(tag, table, hn::Or(hn::ShiftLeft<8>(own), next)), tag, depths + i);
+    }
+  }
+  for (; i < count; ++i)
+    depths[i] = table[size_t(codes[i]) * 256 + nextCodes[i]];
 }
 
 }  // namespace HWY_NAMESPACE
@@ -65,8 +67,8 @@ void lookUpDepths(const FixedDepth* table, const uint16_t* codes, size_t count, 
 }
 
 void lookUpDepthPairs(const FixedDepth* table, const uint16_t* codes, const uint16_t* nextCodes, size_t count,
-                      FixedDepth* depths) {
-  HWY_DYNAMIC_DISPATCH(lookUpPairRow)(table, codes, nextCodes, count, depths);
+                      uint16_t firstVisible, FixedDepth* depths) {
+  HWY_DYNAMIC_DISPATCH(lookUpPairRow)(table, codes, nextCodes, count, firstVisible, depths);
 }
 
 }  // namespace freevoxel

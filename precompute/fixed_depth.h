@@ -47,8 +47,9 @@ constexpr uint8_t attenuationCode(FixedDepth depth) {
 /// depths[i] = table[codes[i]].
 void lookUpDepths(const FixedDepth* table, const uint16_t* codes, size_t count, FixedDepth* depths);
 
-/// depths[i] = table[codes[i] * 256 + nextCodes[i]], both codes up to 255.
+/// depths[i] = table[codes[i] * 256 + nextCodes[i]], both codes up to 255. Where both are below `firstVisible` the
+/// table must hold 0: it is not looked into there.
 void lookUpDepthPairs(const FixedDepth* table, const uint16_t* codes, const uint16_t* nextCodes, size_t count,
-                      FixedDepth* depths);
+                      uint16_t firstVisible, FixedDepth* depths);
 
 }  // namespace freevoxel

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <random>
@@ -69,17 +70,20 @@ TEST(FixedDepth, rowsAreLookedUpLikeSingleCodes) {
   std::vector<FixedDepth> table(256 * 256);
   for (FixedDepth& depth : table)
     depth = random();
+  constexpr uint16_t kFirstVisible = 200;
+  for (size_t a = 0; a < kFirstVisible; ++a)
+    std::fill_n(table.begin() + ptrdiff_t(a * 256), kFirstVisible, 0);
   for (const int64_t target : test::instructionSets()) {
     const test::InstructionSet chosen(target);
     for (size_t count = 0; count < 70; ++count) {
       std::vector<uint16_t> codes(count + 1), nextCodes(count + 1);
       for (size_t i = 0; i <= count; ++i) {
-        codes[i] = uint16_t(random() & 255);
-        nextCodes[i] = uint16_t(random() & 255);
+        codes[i] = uint16_t(count % 2 == 0 ? random() & 255 : random() % kFirstVisible);
+        nextCodes[i] = uint16_t(count % 2 == 0 ? random() & 255 : random() % kFirstVisible);
       }
       std::vector<FixedDepth> single(count + 2, 1234u), pairs(count + 2, 1234u);
       lookUpDepths(table.data(), codes.data() + 1, count, single.data() + 1);
-      lookUpDepthPairs(table.data(), codes.data() + 1, nextCodes.data() + 1, count, pairs.data() + 1);
+      lookUpDepthPairs(table.data(), codes.data() + 1, nextCodes.data() + 1, count, kFirstVisible, pairs.data() + 1);
       for (size_t i = 1; i <= count; ++i) {
         ASSERT_EQ(single[i], table[codes[i]]);
         ASSERT_EQ(pairs[i], table[size_t(codes[i]) * 256 + nextCodes[i]]);
