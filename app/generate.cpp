@@ -1,13 +1,16 @@
 // freevoxel generate: volumes made by formula.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
+#include <span>
+#include <vector>
 
 #include "app/command.h"
 #include "app/input_file.h"
 #include "base/atomic_file.h"
 #include "volume/procedural.h"
-#include "volume/read_volume.h"
+#include "volume/write_nrrd.h"
 
 namespace freevoxel {
 
@@ -22,11 +25,38 @@ struct GenerateOptions {
   bool compress = false;
 };
 
-void writeRaw(const std::string& path, const Volume& volume) {
-  AtomicFile file(path);
-  file.reserve(volume.data.size());
-  file.writeAt(0, volume.data);
+/// Slices are made and written a few at a time: the volume need not fit memory.
+constexpr uint64_t kPortionBytes = uint64_t(64) << 20;
+
+/// Calls write(bytes) with all slices in order.
+template <class Write>
+void generateInPortions(const GenerateOptions& options, const VolumeHeader& header, Session& session, Write&& write) {
+  const uint64_t sliceBytes = header.bytes() / uint64_t(header.dims.z);
+  const int portion = int(std::clamp<uint64_t>(kPortionBytes / sliceBytes, 1, uint64_t(header.dims.z)));
+  std::vector<std::byte> bytes(uint64_t(portion) * sliceBytes);
+  for (int first = 0; first < header.dims.z; first += portion) {
+    const int count = std::min(portion, header.dims.z - first);
+    const auto part = std::span(bytes).first(uint64_t(count) * sliceBytes);
+    session.timed("generate", [&] { generateSlices(options.kind, header.dims, options.seed, first, count, part); });
+    session.timed("write", [&] { write(part); });
+  }
+}
+
+void writeRaw(const GenerateOptions& options, const VolumeHeader& header, Session& session) {
+  AtomicFile file(options.output);
+  file.reserve(header.bytes());
+  uint64_t offset = 0;
+  generateInPortions(options, header, session, [&](std::span<const std::byte> bytes) {
+    file.writeAt(offset, bytes);
+    offset += bytes.size();
+  });
   file.commit();
+}
+
+void writeNrrdFile(const GenerateOptions& options, const VolumeHeader& header, Session& session) {
+  NrrdWriter writer(options.output, header, options.compress);
+  generateInPortions(options, header, session, [&](std::span<const std::byte> bytes) { writer.append(bytes); });
+  session.timed("write", [&] { writer.finish(); });
 }
 
 Outcome generate(const GenerateOptions& options, Session& session) {
@@ -37,16 +67,14 @@ Outcome generate(const GenerateOptions& options, Session& session) {
   if (extension == "raw" && (options.compress || options.spacing)) {
     throw UsageError("--compress and --spacing need a .nrrd file, which can hold them");
   }
-  Volume volume = session.timed("generate", [&] { return generateVolume(options.kind, *options.dims, options.seed); });
-  if (options.spacing) volume.header.placement.spacing = *options.spacing;
-  session.timed("write", [&] {
-    if (extension == "raw") {
-      writeRaw(options.output, volume);
-    } else {
-      writeNrrd(options.output, volume, options.compress);
-    }
-  });
-  session.statistics["voxels"] = volume.header.voxels();
+  VolumeHeader header = proceduralHeader(options.kind, *options.dims);
+  if (options.spacing) header.placement.spacing = *options.spacing;
+  if (extension == "raw") {
+    writeRaw(options, header, session);
+  } else {
+    writeNrrdFile(options, header, session);
+  }
+  session.statistics["voxels"] = header.voxels();
   session.statistics["fileBytes"] = fileBytes(options.output);
   return Outcome::done;
 }

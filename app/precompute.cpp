@@ -3,9 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
+#include <optional>
 
 #include "app/command.h"
+#include "app/parse.h"
 #include "app/precompute_report.h"
 #include "volume/read_volume.h"
 #include "volume/transfer_presets.h"
@@ -17,8 +20,19 @@ namespace {
 struct PrecomputeCommandOptions {
   std::string input, output, transfer;
   VolumeOptions raw;
+  std::optional<uint64_t> memory;
   PrecomputeOptions precompute;
 };
+
+/// Of --memory, what the program takes beside the volume: libraries, threads' stacks, tables.
+constexpr uint64_t kProgramBytes = uint64_t(128) << 20;
+
+uint64_t parseMemory(std::string_view text) {
+  constexpr uint64_t kLeast = uint64_t(64) << 20;
+  const uint64_t bytes = parseBytes(text);
+  if (bytes < kLeast) throw UsageError(fmt::format("expected at least 64M, found '{}'", text));
+  return bytes;
+}
 
 /// Between two labels there is nothing to integrate.
 Classification labelClassification(const PrecomputeCommandOptions& options, const CLI::App& command) {
@@ -31,11 +45,21 @@ Classification labelClassification(const PrecomputeCommandOptions& options, cons
 
 Outcome precomputeCommand(PrecomputeCommandOptions options, const CLI::App& command, Session& session) {
   options.precompute.command = session.command();
+  const auto classify = [&](const TransferFunction& transfer) {
+    if (transfer.isLabels) options.precompute.classification = labelClassification(options, command);
+  };
+  if (options.memory) {
+    options.precompute.memoryBytes = *options.memory - std::min(*options.memory / 2, kProgramBytes);
+    const auto source = openVolume(options.input, options.raw);
+    const TransferFunction transfer = chooseTransfer(options.transfer, source->header());
+    classify(transfer);
+    reportPrecompute(precompute(*source, transfer, options.output, options.precompute, session.progress()), session);
+    return Outcome::done;
+  }
   const Volume volume = session.timed("read", [&] { return readVolume(options.input, options.raw); });
   const TransferFunction transfer = chooseTransfer(options.transfer, volume);
-  if (transfer.isLabels) options.precompute.classification = labelClassification(options, command);
-  const PrecomputeResult result = precompute(volume, transfer, options.output, options.precompute, session.progress());
-  reportPrecompute(result, session);
+  classify(transfer);
+  reportPrecompute(precompute(volume, transfer, options.output, options.precompute, session.progress()), session);
   return Outcome::done;
 }
 
@@ -82,6 +106,11 @@ Command addPrecompute(CLI::App& program, CommonOptions& common) {
                     "how attenuation is stored: all of it, or the faces of bricks, compressed");
   addChoice<int>(*command, "--brick", options->precompute.brickEdge, {{"8", 8}, {"16", 16}, {"32", 32}},
                  "edge of a brick in voxels");
+  addParsed(
+      *command, "--memory", options->memory, "BYTES",
+      "take no more memory than this, 64M or more, for the whole run: the volume is read in slices, and its codes "
+      "wait on the disk beside the output; K, M and G are powers of 1024 (default: the volume is held in memory)",
+      parseMemory);
   addVolumeOptions(*command, options->raw);
   addCommonOptions(*command, common);
   return {command, [options, command](Session& session) { return precomputeCommand(*options, *command, session); }};

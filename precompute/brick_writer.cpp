@@ -41,71 +41,71 @@ BrickWriter::BrickWriter(BrickStore& store, std::span<const StoredBrick> bricks,
       advanced_(std::move(advanced)),
       slabs_(size_t(brickDims(dims, edge).z)) {
   const int order = brickCurveOrder(dims, edge);
-  size_t largestSlab = 0;
   for (size_t i = 0; i < bricks.size(); ++i) {
-    steps_.push_back(hilbertSteps(hilbertState(bricks[i].position, order), std::countr_zero(unsigned(edge))));
+    states_.push_back(hilbertState(bricks[i].position, order));
+    steps_.push_back(hilbertSteps(states_.back(), std::countr_zero(unsigned(edge))));
     auto& slab = slabs_[size_t(bricks[i].position.z)];
     slab.push_back(i);
-    largestSlab = std::max(largestSlab, slab.size());
+    largestSlab_ = std::max(largestSlab_, slab.size());
   }
-  for (auto& planes : planes_)
-    planes.resize(largestSlab * kDirectionsPerSection * brickVoxels());
 }
 
-void BrickWriter::writeCodes(std::span<const uint16_t> codes, const ValueCoding& coding) {
+void BrickWriter::writeCodes(int slab, std::span<const uint16_t> codes, const ValueCoding& coding) {
   if (coding.bytes() == 1) {
-    writeCodesAs<uint8_t>(codes);
+    writeCodesAs<uint8_t>(slab, codes);
   } else {
-    writeCodesAs<uint16_t>(codes);
+    writeCodesAs<uint16_t>(slab, codes);
   }
 }
 
 template <class Code>
-void BrickWriter::writeCodesAs(std::span<const uint16_t> codes) {
-  for (const std::vector<size_t>& slab : slabs_) {
-    FirstException failure;
+void BrickWriter::writeCodesAs(int slab, std::span<const uint16_t> codes) {
+  const std::vector<size_t>& bricks = slabs_[size_t(slab)];
+  FirstException failure;
 #pragma omp parallel for schedule(dynamic, 4)
-    for (size_t b = 0; b < slab.size(); ++b) {
-      failure.guard([&] {
-        const size_t i = slab[b];
-        std::vector<Code> plane(brickVoxels());
-        permuteBrick(codes.data() + linearIndex(bricks_[i].position * edge_, dims_), dims_,
-                     brickExtent(bricks_[i].position, dims_, edge_), edge_, steps_[i], Code(0), plane.data());
-        store_.codes(i, std::as_bytes(std::span(plane)));
-      });
-    }
-    failure.rethrow();
-    store_.endSlab();
-  }
-}
-
-void BrickWriter::receive(const AttenuationSlab& slab) {
-  const std::vector<size_t>& bricks = bricksAt(slab.firstPlane);
-  const std::span<uint8_t> planes(planes_[size_t(sweepPass(slab.direction))]);
   for (size_t b = 0; b < bricks.size(); ++b) {
-    const size_t i = bricks[b];
-    const glm::ivec3 position = bricks_[i].position;
-    const uint8_t* source = slab.bytes.data() + linearIndex({position.x * edge_, position.y * edge_, 0}, dims_);
-    const uint64_t plane = b * kDirectionsPerSection + uint64_t(slab.direction % kDirectionsPerSection);
-    permuteBrick(source, dims_, brickExtent(position, dims_, edge_), edge_, steps_[i], kAttenuationOutside,
-                 planes.subspan(plane * brickVoxels(), brickVoxels()).data());
+    failure.guard([&] {
+      const size_t i = bricks[b];
+      const glm::ivec3 position = bricks_[i].position;
+      std::vector<Code> plane(brickVoxels());
+      permuteBrick(codes.data() + linearIndex({position.x * edge_, position.y * edge_, 0}, dims_), dims_,
+                   brickExtent(position, dims_, edge_), edge_, steps_[i], Code(0), plane.data());
+      store_.codes(i, std::as_bytes(std::span(plane)));
+    });
   }
-  advanced_(slab.bytes.size());
+  failure.rethrow();
+  store_.endSlab();
 }
 
-void BrickWriter::complete(int pass, int firstPlane) {
+std::span<const BrickPlanes> BrickWriter::begin(int pass, int slab) {
+  auto& wanted = wanted_[size_t(pass)];
+  wanted.clear();
+  planes_[size_t(pass)].resize(passBytes() / sizeof(Line));
+  uint8_t* planes = planes_[size_t(pass)].data()->bytes;
+  for (const size_t i : slabs_[size_t(slab)]) {
+    wanted.push_back({bricks_[i].position, states_[i], planes});
+    planes += kDirectionsPerSection * brickVoxels();
+  }
+  return wanted;
+}
+
+void BrickWriter::complete(int pass, int slab) {
   const auto start = std::chrono::steady_clock::now();
-  const std::vector<size_t>& bricks = bricksAt(firstPlane);
+  const std::vector<size_t>& bricks = slabs_[size_t(slab)];
   const uint64_t brickBytes = kDirectionsPerSection * brickVoxels();
   FirstException failure;
 #pragma omp parallel for schedule(dynamic, 4)
   for (size_t b = 0; b < bricks.size(); ++b) {
     failure.guard([&] {
-      store_.attenuation(pass, bricks[b], std::span(planes_[size_t(pass)]).subspan(b * brickBytes, brickBytes));
+      store_.attenuation(pass, bricks[b], std::span<const uint8_t>(wanted_[size_t(pass)][b].planes, brickBytes));
     });
   }
   failure.rethrow();
   store_.endSlab();
+  const glm::ivec3 slabDims(dims_.x, dims_.y, std::min(edge_, dims_.z - slab * edge_));
+  const bool last = pass == 0 ? size_t(slab) + 1 == slabs_.size() : slab == 0;
+  if (last) planes_[size_t(pass)] = {};
+  advanced_(voxelCount(slabDims) * kDirectionsPerSection);
   writeSeconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 

@@ -13,47 +13,39 @@ namespace freevoxel {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-void addRow(const FixedDepth* HWY_RESTRICT next, const FixedDepth* HWY_RESTRICT segments, size_t count,
-            FixedDepth* HWY_RESTRICT depths) {
-  const hn::ScalableTag<uint32_t> tag;
-  size_t i = 0;
-  for (; i + hn::Lanes(tag) <= count; i += hn::Lanes(tag)) {
-    const auto a = hn::LoadU(tag, next + i);
-    const auto b = hn::LoadU(tag, segments + i);
-    hn::StoreU(hn::Add(hn::Min(a, hn::Not(b)), b), tag, depths + i);
-  }
-  for (; i < count; ++i)
-    depths[i] = saturatingSum(next[i], segments[i]);
-}
-
-/// attenuationCode, operation by operation.
-void codeRow(const FixedDepth* HWY_RESTRICT depths, size_t count, uint8_t* HWY_RESTRICT codes) {
+void lookUpRow(const FixedDepth* HWY_RESTRICT table, const uint16_t* HWY_RESTRICT codes, size_t count,
+               FixedDepth* HWY_RESTRICT depths) {
   const hn::ScalableTag<uint32_t> tag;
   const hn::RebindToSigned<decltype(tag)> integers;
-  const hn::RebindToFloat<decltype(tag)> floats;
-  const hn::Rebind<uint8_t, decltype(integers)> bytes;
-  const auto c0 = hn::Set(floats, kExp2Coefficients[0]);
-  const auto c1 = hn::Set(floats, kExp2Coefficients[1]);
-  const auto c2 = hn::Set(floats, kExp2Coefficients[2]);
-  const auto c3 = hn::Set(floats, kExp2Coefficients[3]);
-  const auto c4 = hn::Set(floats, kExp2Coefficients[4]);
+  const hn::Rebind<uint16_t, decltype(integers)> halves;
   size_t i = 0;
   for (; i + hn::Lanes(tag) <= count; i += hn::Lanes(tag)) {
-    const auto wide = hn::BitCast(integers, hn::ShiftRight<8>(hn::LoadU(tag, depths + i)));
-    const auto coded = hn::Min(wide, hn::Set(integers, kLargestCodedDepth));
-    const auto f = hn::ConvertTo(floats, hn::And(coded, hn::Set(integers, 0xffff)));
-    // Not MulAdd: rounding once where attenuationCode rounds twice would give other bytes.
-    auto power = hn::Add(c3, hn::Mul(f, c4));
-    power = hn::Add(c2, hn::Mul(f, power));
-    power = hn::Add(c1, hn::Mul(f, power));
-    power = hn::Add(c0, hn::Mul(f, power));
-    const auto exponent = hn::ShiftLeft<23>(hn::ShiftRight<16>(coded));
-    const auto code = hn::BitCast(floats, hn::Sub(hn::BitCast(integers, power), exponent));
-    const auto rounded = hn::ConvertTo(integers, hn::Add(code, hn::Set(floats, 0.5f)));
-    hn::StoreU(hn::DemoteTo(bytes, rounded), bytes, codes + i);
+    const auto index = hn::PromoteTo(integers, hn::LoadU(halves, codes + i));
+    hn::StoreU(hn::GatherIndex(tag, table, index), tag, depths + i);
   }
   for (; i < count; ++i)
-    codes[i] = attenuationCode(depths[i]);
+    depths[i] = table[codes[i]];
+}
+
+void lookUpPairRow(const FixedDepth* HWY_RESTRICT table, const uint16_t* HWY_RESTRICT codes,
+                   const uint16_t* HWY_RESTRICT nextCodes, size_t count, uint16_t firstVisible,
+                   FixedDepth* HWY_RESTRICT depths) {
+  const hn::ScalableTag<uint32_t> tag;
+  const hn::RebindToSigned<decltype(tag)> integers;
+  const hn::Rebind<uint16_t, decltype(integers)> halves;
+  const auto visible = hn::Set(integers, firstVisible);
+  size_t i = 0;
+  for (; i + hn::Lanes(tag) <= count; i += hn::Lanes(tag)) {
+    const auto own = hn::PromoteTo(integers, hn::LoadU(halves, codes + i));
+    const auto next = hn::PromoteTo(integers, hn::LoadU(halves, nextCodes + i));
+    if (hn::AllTrue(integers, hn::Lt(hn::Max(own, next), visible))) {
+      hn::StoreU(hn::Zero(tag), tag, depths + i);
+    } else {
+      hn::StoreU(hn::GatherIndex(tag, table, hn::Or(hn::ShiftLeft<8>(own), next)), tag, depths + i);
+    }
+  }
+  for (; i < count; ++i)
+    depths[i] = table[size_t(codes[i]) * 256 + nextCodes[i]];
 }
 
 }  // namespace HWY_NAMESPACE
@@ -63,19 +55,20 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace freevoxel {
 
-HWY_EXPORT(addRow);
-HWY_EXPORT(codeRow);
+HWY_EXPORT(lookUpRow);
+HWY_EXPORT(lookUpPairRow);
 
 FixedDepth fixedDepth(double sigma) {
   return roundedDepth(sigma / std::log(2.0) * kDepthUnitsPerLog2);
 }
 
-void addDepths(const FixedDepth* next, const FixedDepth* segments, size_t count, FixedDepth* depths) {
-  HWY_DYNAMIC_DISPATCH(addRow)(next, segments, count, depths);
+void lookUpDepths(const FixedDepth* table, const uint16_t* codes, size_t count, FixedDepth* depths) {
+  HWY_DYNAMIC_DISPATCH(lookUpRow)(table, codes, count, depths);
 }
 
-void attenuationCodes(const FixedDepth* depths, size_t count, uint8_t* codes) {
-  HWY_DYNAMIC_DISPATCH(codeRow)(depths, count, codes);
+void lookUpDepthPairs(const FixedDepth* table, const uint16_t* codes, const uint16_t* nextCodes, size_t count,
+                      uint16_t firstVisible, FixedDepth* depths) {
+  HWY_DYNAMIC_DISPATCH(lookUpPairRow)(table, codes, nextCodes, count, firstVisible, depths);
 }
 
 }  // namespace freevoxel

@@ -44,10 +44,12 @@ constexpr uint8_t attenuationCode(FixedDepth depth) {
   return uint8_t(code + 0.5f);  // NOLINT(bugprone-incorrect-roundings): never negative
 }
 
-/// depths[i] = saturatingSum(next[i], segments[i]). The arrays do not overlap.
-void addDepths(const FixedDepth* next, const FixedDepth* segments, size_t count, FixedDepth* depths);
+/// depths[i] = table[codes[i]].
+void lookUpDepths(const FixedDepth* table, const uint16_t* codes, size_t count, FixedDepth* depths);
 
-/// codes[i] = attenuationCode(depths[i]).
-void attenuationCodes(const FixedDepth* depths, size_t count, uint8_t* codes);
+/// depths[i] = table[codes[i] * 256 + nextCodes[i]], both codes up to 255. Where both are below `firstVisible` the
+/// table must hold 0: it is not looked into there.
+void lookUpDepthPairs(const FixedDepth* table, const uint16_t* codes, const uint16_t* nextCodes, size_t count,
+                      uint16_t firstVisible, FixedDepth* depths);
 
 }  // namespace freevoxel

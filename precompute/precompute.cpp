@@ -1,11 +1,11 @@
 #include "precompute/precompute.h"
 
+#include <omp.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
-#include <memory>
-#include <mutex>
 #include <new>
 #include <span>
 #include <utility>
@@ -18,8 +18,10 @@
 #include "precompute/brick_store.h"
 #include "precompute/brick_writer.h"
 #include "precompute/checksums.h"
+#include "precompute/code_spool.h"
 #include "precompute/stored_bricks.h"
 #include "precompute/sweep.h"
+#include "volume/code_visibility.h"
 #include "volume/value_codes.h"
 
 namespace freevoxel {
@@ -75,6 +77,14 @@ class SectionPlan {
   uint64_t fileBytes_ = 0;
 };
 
+/// What has to be known of a volume before the file can be planned.
+struct Survey {
+  ValueCoding coding;
+  std::vector<StoredBrick> bricks;  ///< in file order
+  uint64_t nonFinite = 0;
+  double largestValueError = 0.0;
+};
+
 double largestCodingError(const Volume& volume, std::span<const uint16_t> codes, const ValueCoding& coding,
                           const TransferFunction& transfer) {
   return withValues(volume, [&](const auto* values) {
@@ -89,20 +99,6 @@ double largestCodingError(const Volume& volume, std::span<const uint16_t> codes,
     return largest;
   });
 }
-
-/// Passes on what many threads report.
-class SharedProgress {
- public:
-  explicit SharedProgress(Progress& progress) : progress_(progress) {}
-  void advance(uint64_t steps) {
-    const std::lock_guard lock(mutex_);
-    progress_.advance(steps);
-  }
-
- private:
-  Progress& progress_;
-  std::mutex mutex_;
-};
 
 /// The sections that hold bricks: of codes, of directions 0..12 and of 13..25.
 constexpr std::array<SectionType, 3> brickSections(Layout layout) {
@@ -174,18 +170,25 @@ std::vector<int8_t> directionTable() {
   return table;
 }
 
+/// Which passes run together, one set of bits after the other (sweepAttenuation).
+using PassPlan = std::vector<unsigned>;
+
 /// Sweeps, and gives `store` all bricks. Adds its figures to `result`.
-void fillStore(BrickStore& store, const Volume& volume, const TransferFunction& transfer,
-               std::span<const uint16_t> codes, const ValueCoding& coding, std::span<const StoredBrick> bricks,
-               const PrecomputeOptions& options, Progress& progress, PrecomputeResult& result) {
-  SharedProgress sharedProgress(progress);
-  BrickWriter writer(store, bricks, volume.header.dims, options.brickEdge,
-                     [&](uint64_t voxels) { sharedProgress.advance(voxels); });
-  writer.writeCodes(codes, coding);
-  const auto segments = makeSegmentDepth(options.classification, transfer, coding);
-  progress.begin("attenuation", volume.header.voxels() * shared::kDirectionCount, "voxels");
+void fillStore(BrickStore& store, const VolumeHeader& header, const TransferFunction& transfer, CodePlanes& codes,
+               const Survey& survey, const PassPlan& passPlan, const PrecomputeOptions& options, Progress& progress,
+               PrecomputeResult& result) {
+  BrickWriter writer(store, survey.bricks, header.dims, options.brickEdge,
+                     [&](uint64_t voxels) { progress.advance(voxels); });
+  for (int slab = 0; slab < brickDims(header.dims, options.brickEdge).z; ++slab) {
+    const int first = slab * options.brickEdge;
+    const int count = std::min(options.brickEdge, header.dims.z - first);
+    writer.writeCodes(slab, codes.planes(0, first, count), survey.coding);
+  }
+  const auto segments = makeSegmentDepth(options.classification, transfer, survey.coding);
+  progress.begin("attenuation", header.voxels() * shared::kDirectionCount, "voxels");
   const auto sweepStart = Clock::now();
-  sweepAttenuation(codes, volume.header.dims, *segments, options.brickEdge, writer);
+  for (const unsigned passes : passPlan)
+    sweepAttenuation(codes, header.dims, options.brickEdge, *segments, writer, passes);
   result.sweepSeconds = secondsSince(sweepStart) - writer.writeSeconds();
   progress.end();
 }
@@ -206,12 +209,12 @@ void closeGaps(AtomicFile& file, const CompactStore& store, SectionPlan& plan) {
 }
 
 /// The file proper, given all that is known before the sweep. Adds its figures to `result`.
-void writeFile(const Volume& volume, const TransferFunction& transfer, std::span<const uint16_t> codes,
-               const ValueCoding& coding, std::span<const StoredBrick> bricks, const std::string& path,
-               const PrecomputeOptions& options, Progress& progress, PrecomputeResult& result) {
+void writeFile(const VolumeHeader& header, const TransferFunction& transfer, CodePlanes& codes, const Survey& survey,
+               const PassPlan& passPlan, const std::string& path, const PrecomputeOptions& options, Progress& progress,
+               PrecomputeResult& result) {
   const auto start = Clock::now();
   const std::string transferText = transferFunctionJson(transfer);
-  SectionPlan plan = planSections(options, coding, bricks.size(), transferText);
+  SectionPlan plan = planSections(options, survey.coding, survey.bricks.size(), transferText);
   const auto [codesType, backwardType, forwardType] = brickSections(options.layout);
   AtomicFile file(path);
   std::unique_ptr<BrickStore> store;
@@ -219,16 +222,16 @@ void writeFile(const Volume& volume, const TransferFunction& transfer, std::span
   if (options.layout == Layout::dense) {
     file.reserve(plan.fileBytes());
     store = std::make_unique<DenseStore>(
-        file, DenseStore::Offsets{plan[codesType].offset, plan[backwardType].offset, plan[forwardType].offset}, bricks,
-        options.brickEdge, coding.bytes());
+        file, DenseStore::Offsets{plan[codesType].offset, plan[backwardType].offset, plan[forwardType].offset},
+        survey.bricks, options.brickEdge, survey.coding.bytes());
   } else {
     auto made = std::make_unique<CompactStore>(
-        file, std::array{plan[codesType].offset, plan[backwardType].offset, plan[forwardType].offset}, bricks,
-        volume.header.dims, options.brickEdge, coding.bytes());
+        file, std::array{plan[codesType].offset, plan[backwardType].offset, plan[forwardType].offset}, survey.bricks,
+        header.dims, options.brickEdge, survey.coding.bytes());
     compact = made.get();
     store = std::move(made);
   }
-  fillStore(*store, volume, transfer, codes, coding, bricks, options, progress, result);
+  fillStore(*store, header, transfer, codes, survey, passPlan, options, progress, result);
   if (compact != nullptr) closeGaps(file, *compact, plan);
 
   const auto writeSection = [&](SectionType type, std::span<const std::byte> bytes) {
@@ -237,7 +240,7 @@ void writeFile(const Volume& volume, const TransferFunction& transfer, std::span
     file.writeAt(plan[type].offset, bytes);
   };
   const std::vector<int8_t> directions = directionTable();
-  const Metadata metadata = describe(volume.header, transfer, options, coding, result);
+  const Metadata metadata = describe(header, transfer, options, survey.coding, result);
   writeSection(section::kMetadata, std::as_bytes(std::span(&metadata, 1)));
   writeSection(section::kTransfer, std::as_bytes(std::span(transferText)));
   writeSection(section::kDirections, std::as_bytes(std::span(directions)));
@@ -250,32 +253,150 @@ void writeFile(const Volume& volume, const TransferFunction& transfer, std::span
 
   // The header comes last, when all else is on the disk: without it nothing takes the file for an attenuation file.
   file.sync();
-  FileHeader header{kFileMagic, kFileVersion, uint32_t(plan.sections().size()), plan.fileBytes(), 0};
-  header.hash = headerHash(header, plan.sections());
+  FileHeader fileHeader{kFileMagic, kFileVersion, uint32_t(plan.sections().size()), plan.fileBytes(), 0};
+  fileHeader.hash = headerHash(fileHeader, plan.sections());
   file.writeAt(sizeof(FileHeader), std::as_bytes(plan.sections()));
-  file.writeAt(0, std::as_bytes(std::span(&header, 1)));
+  file.writeAt(0, std::as_bytes(std::span(&fileHeader, 1)));
   file.commit();
   result.fileBytes = plan.fileBytes();
   result.writeSeconds = secondsSince(start) - result.sweepSeconds;
 }
 
+PrecomputeResult resultOf(const VolumeHeader& header, const Survey& survey, int edge) {
+  PrecomputeResult result;
+  result.voxels = header.voxels();
+  result.bricks = survey.bricks.size();
+  for (const StoredBrick& brick : survey.bricks) {
+    result.storedVoxels += voxelCount(brickExtent(brick.position, header.dims, edge));
+    result.visibleVoxels += brick.visibleVoxels;
+  }
+  result.nonFinite = survey.nonFinite;
+  result.largestValueError = survey.largestValueError;
+  return result;
+}
+
 PrecomputeResult precomputeChecked(const Volume& volume, const TransferFunction& transfer, const std::string& path,
                                    const PrecomputeOptions& options, Progress& progress) {
   const glm::ivec3 dims = volume.header.dims;
-  const ValueCoding coding = valueCoding(volume.header.type, transfer.low, transfer.high);
-  const std::vector<uint16_t> codes = encodeValues(volume, coding);
-  const std::vector<StoredBrick> bricks = findStoredBricks(codes, dims, options.brickEdge, transfer, coding);
-  PrecomputeResult result;
-  result.voxels = volume.header.voxels();
-  result.bricks = bricks.size();
-  for (const StoredBrick& brick : bricks) {
-    result.storedVoxels += voxelCount(brickExtent(brick.position, dims, options.brickEdge));
-    result.visibleVoxels += brick.visibleVoxels;
-  }
-  result.nonFinite = valueStatistics(volume).nonFinite;
-  result.largestValueError = largestCodingError(volume, codes, coding, transfer);
-  writeFile(volume, transfer, codes, coding, bricks, path, options, progress, result);
+  Survey survey;
+  survey.coding = valueCoding(volume.header.type, transfer.low, transfer.high);
+  const std::vector<uint16_t> codes = encodeValues(volume, survey.coding);
+  survey.bricks = findStoredBricks(codes, dims, options.brickEdge, transfer, survey.coding);
+  survey.nonFinite = valueStatistics(volume).nonFinite;
+  survey.largestValueError = largestCodingError(volume, codes, survey.coding, transfer);
+  PrecomputeResult result = resultOf(volume.header, survey, options.brickEdge);
+  StoredCodePlanes planes(codes, dims);
+  writeFile(volume.header, transfer, planes, survey, {3u}, path, options, progress, result);
   return result;
+}
+
+/// Bytes held while the volume is read: the slice and its codes, the codes of a slab and its neighbours, the ranges
+/// that findStoredBricks makes of them.
+uint64_t surveyBytes(const VolumeHeader& header, int edge) {
+  const uint64_t planeVoxels = uint64_t(header.dims.x) * uint64_t(header.dims.y);
+  return planeVoxels * (bytesPerValue(header.type) + 2 + 2 * (uint64_t(edge) + 2) + 12);
+}
+
+/// Bytes held while so many passes run at once. `bricks`: of the volume, and of its largest slab, stored.
+uint64_t passBytes(const VolumeHeader& header, const PrecomputeOptions& options, int passCount, uint64_t bricks,
+                   uint64_t slabBricks) {
+  const int edge = options.brickEdge;
+  const uint64_t planeVoxels = uint64_t(header.dims.x) * uint64_t(header.dims.y);
+  const uint64_t brickVoxels = uint64_t(edge) * uint64_t(edge) * uint64_t(edge);
+  const uint64_t window = planeVoxels * 2 * (uint64_t(edge) + 1);
+  constexpr uint64_t kBytesPerBrick = 2 * (sizeof(StoredBrick) + sizeof(BrickEntry) + 32);  // lists that grow
+  // A slab's frames wait until all of them are packed.
+  const uint64_t frames = options.layout == Layout::compact
+                              ? bricks * sizeof(FrameEntry) + slabBricks * largestFrame(passFaceBytes(edge))
+                              : 0;
+  return bricks * kBytesPerBrick + frames +
+         uint64_t(passCount) * (window + slabBricks * kDirectionsPerSection * brickVoxels) +
+         sweepBytes(header.dims, edge, passCount, omp_get_max_threads());
+}
+
+[[noreturn]] void failForMemory(const std::string& path, uint64_t needed, const PrecomputeOptions& options) {
+  throw MachineError(fmt::format(
+      "{}: bricks of {} voxels an edge need {} bytes of memory for this volume, {} are allowed; try more{}", path,
+      options.brickEdge, needed, options.memoryBytes, options.brickEdge > 8 ? ", or smaller bricks" : ""));
+}
+
+/// Reads the volume once: its codes into `spool`, its figures into the result.
+Survey surveySource(VolumeSource& source, const TransferFunction& transfer, int edge, CodeSpool& spool,
+                    const ValueCoding& coding, Progress& progress) {
+  const VolumeHeader& header = source.header();
+  const glm::ivec3 dims = header.dims;
+  const size_t planeVoxels = size_t(dims.x) * size_t(dims.y);
+  const CodeVisibility visibility(transfer, coding);
+  Survey survey;
+  survey.coding = coding;
+  Volume slice;
+  slice.header = header;
+  slice.header.dims.z = 1;
+  slice.data.resize(slice.header.bytes());
+  std::vector<uint16_t> window(planeVoxels * (size_t(edge) + 2));
+  int windowFirst = 0, read = 0;
+  progress.begin("reading", header.voxels(), "voxels");
+  for (int slab = 0; slab < brickDims(dims, edge).z; ++slab) {
+    const PlaneRange planes = planesOfSlab(dims, edge, slab);
+    const size_t kept = size_t(read - planes.first) * planeVoxels;
+    const auto from = window.begin() + ptrdiff_t(size_t(planes.first - windowFirst) * planeVoxels);
+    std::copy(from, from + ptrdiff_t(kept), window.begin());
+    windowFirst = planes.first;
+    for (; read < planes.last; ++read) {
+      source.readSlices(1, slice.data);
+      const std::vector<uint16_t> codes = encodeValues(slice, coding);
+      survey.nonFinite += valueStatistics(slice).nonFinite;
+      survey.largestValueError = std::max(survey.largestValueError, largestCodingError(slice, codes, coding, transfer));
+      spool.append(codes);
+      std::copy(codes.begin(), codes.end(), window.begin() + ptrdiff_t(size_t(read - windowFirst) * planeVoxels));
+      progress.advance(planeVoxels);
+    }
+    const auto used = std::span<const uint16_t>(window).first(size_t(planes.last - planes.first) * planeVoxels);
+    const auto found = findStoredBricks(used, dims, edge, slab, visibility);
+    survey.bricks.insert(survey.bricks.end(), found.begin(), found.end());
+  }
+  progress.end();
+  sortAlongCurve(survey.bricks);
+  return survey;
+}
+
+PrecomputeResult precomputeChecked(VolumeSource& source, const TransferFunction& transfer, const std::string& path,
+                                   const PrecomputeOptions& options, Progress& progress) {
+  const VolumeHeader header = source.header();
+  const int edge = options.brickEdge;
+  const auto allows = [&](uint64_t bytes) { return options.memoryBytes == 0 || bytes <= options.memoryBytes; };
+  // What is known before anything is read.
+  const uint64_t least = std::max(surveyBytes(header, edge), passBytes(header, options, 1, 0, 0));
+  if (!allows(least)) failForMemory(path, least, options);
+
+  const ValueCoding coding = valueCoding(header.type, transfer.low, transfer.high);
+  CodeSpool spool(path, header.dims, coding.bytes());
+  const Survey survey = surveySource(source, transfer, edge, spool, coding, progress);
+  std::vector<uint64_t> slabBricks(size_t(brickDims(header.dims, edge).z));
+  for (const StoredBrick& brick : survey.bricks)
+    ++slabBricks[size_t(brick.position.z)];
+  const uint64_t largestSlab = *std::max_element(slabBricks.begin(), slabBricks.end());
+  const uint64_t single = passBytes(header, options, 1, survey.bricks.size(), largestSlab);
+  if (!allows(single)) failForMemory(path, single, options);
+  const bool together = allows(passBytes(header, options, 2, survey.bricks.size(), largestSlab));
+  PrecomputeResult result = resultOf(header, survey, edge);
+  writeFile(header, transfer, spool, survey, together ? PassPlan{3u} : PassPlan{1u, 2u}, path, options, progress,
+            result);
+  return result;
+}
+
+/// Calls f; no memory becomes an error that says of what.
+template <class F>
+PrecomputeResult withMemoryErrors(const VolumeHeader& header, const std::string& path, F&& f) {
+  try {
+    return f();
+  } catch (const std::bad_alloc&) {
+    const glm::ivec3 dims = header.dims;
+    throw MachineError(
+        fmt::format("{}: not enough memory to precompute {} x {} x {} voxels; try --memory, a machine with more, or a "
+                    "volume cropped or reduced",
+                    path, dims.x, dims.y, dims.z));
+  }
 }
 
 }  // namespace
@@ -286,15 +407,15 @@ PrecomputeResult precompute(const Volume& volume, const TransferFunction& transf
   check(validDims(volume.header.dims), "volume dims are valid");
   checkEqual(uint64_t(volume.data.size()), volume.header.bytes(), "bytes of the volume");
   volume.header.placement.check();
-  try {
-    return precomputeChecked(volume, transfer, path, options, progress);
-  } catch (const std::bad_alloc&) {
-    const glm::ivec3 dims = volume.header.dims;
-    throw MachineError(
-        fmt::format("{}: not enough memory to precompute {} x {} x {} voxels; try a machine with more, or "
-                    "a volume cropped or reduced",
-                    path, dims.x, dims.y, dims.z));
-  }
+  return withMemoryErrors(volume.header, path,
+                          [&] { return precomputeChecked(volume, transfer, path, options, progress); });
+}
+
+PrecomputeResult precompute(VolumeSource& source, const TransferFunction& transfer, const std::string& path,
+                            const PrecomputeOptions& options, Progress& progress) {
+  checkOptions(options, path);
+  return withMemoryErrors(source.header(), path,
+                          [&] { return precomputeChecked(source, transfer, path, options, progress); });
 }
 
 }  // namespace freevoxel

@@ -6,6 +6,7 @@
 
 #include "base/progress.h"
 #include "precompute/format.h"
+#include "volume/read_volume.h"
 #include "volume/transfer_function.h"
 #include "volume/volume.h"
 
@@ -16,6 +17,8 @@ struct PrecomputeOptions {
   Layout layout = Layout::dense;
   int brickEdge = 16;   ///< voxels; a power of two, 8, 16 or 32
   std::string command;  ///< recorded in the file
+  /// Bytes that precomputing from a VolumeSource may take, 0: as many as there are.
+  uint64_t memoryBytes = 0;
 };
 
 struct PrecomputeResult {
@@ -33,6 +36,15 @@ struct PrecomputeResult {
 /// Writes `path` whole or not at all; the bytes do not depend on the number of OpenMP threads.
 /// Throws InputError or MachineError.
 PrecomputeResult precompute(const Volume& volume, const TransferFunction& transfer, const std::string& path,
+                            const PrecomputeOptions& options, Progress& progress);
+
+/// The same file from a volume that need not fit memory: what is held at any time, input included, stays below
+/// options.memoryBytes. Reads `source` once; its codes wait beside `path` in a file without a name, of one or two bytes
+/// per voxel. Throws as above, and MachineError if memoryBytes is less than the least possible, which it names: mainly
+/// 13
+/// * brickEdge + 36 + 2 * (brickEdge + 1) bytes per voxel of an xy plane, or about twice that if both passes are to run
+/// at once.
+PrecomputeResult precompute(VolumeSource& source, const TransferFunction& transfer, const std::string& path,
                             const PrecomputeOptions& options, Progress& progress);
 
 }  // namespace freevoxel

@@ -16,9 +16,9 @@ class VoxelSegments final : public SegmentDepth {
   }
 
   void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const override {
-    for (size_t x = 0; x < codes.size(); ++x)
-      depths[x] = depths_[nextCodes[x]];
+    lookUpDepths(depths_.data(), nextCodes.data(), codes.size(), depths);
   }
+  bool isOfNeighbourOnly() const override { return true; }
 
  private:
   std::vector<FixedDepth> depths_;
@@ -69,13 +69,19 @@ class PreintegratedSegments final : public SegmentDepth {
         for (size_t b = 0; b <= coding.largest; ++b)
           pairs_[a * 256 + b] = segment(a, b);
       }
+      const auto clear = [&](size_t code) {
+        for (size_t other = 0; other <= code; ++other)
+          if (pairs_[code * 256 + other] != 0 || pairs_[other * 256 + code] != 0) return false;
+        return true;
+      };
+      while (firstVisible_ <= coding.largest && clear(firstVisible_))
+        ++firstVisible_;
     }
   }
 
   void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const override {
     if (!pairs_.empty()) {
-      for (size_t x = 0; x < codes.size(); ++x)
-        depths[x] = pairs_[size_t(codes[x]) * 256 + nextCodes[x]];
+      lookUpDepthPairs(pairs_.data(), codes.data(), nextCodes.data(), codes.size(), firstVisible_, depths);
     } else {
       for (size_t x = 0; x < codes.size(); ++x)
         depths[x] = segment(codes[x], nextCodes[x]);
@@ -90,6 +96,7 @@ class PreintegratedSegments final : public SegmentDepth {
 
   std::vector<double> integral_;
   std::vector<FixedDepth> own_;
+  uint16_t firstVisible_ = 0;      ///< segments between codes below are 0
   std::vector<FixedDepth> pairs_;  ///< segment(a, b) at a * 256 + b, for codes of one byte
 };
 

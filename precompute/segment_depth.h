@@ -19,6 +19,8 @@ class SegmentDepth {
   virtual ~SegmentDepth() = default;
   /// depths[x] = segment(codes[x], nextCodes[x]); all three of one size. Const and safe to call from many threads.
   virtual void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const = 0;
+  /// Whether `codes` make no difference, so that one look-up per voxel serves all directions.
+  virtual bool isOfNeighbourOnly() const { return false; }
 };
 
 /// `voxel`: the neighbour's own depth, so that A8 is the product of T over the voxels strictly between (Eq. 5).

@@ -64,6 +64,7 @@ void markBricks(const CodeVisibility& visibility, const RangePlane& lower, const
   }
 }
 
+/// `codes`: of planesOfSlab().
 std::vector<uint8_t> markSlab(const CodeVisibility& visibility, const uint16_t* codes, glm::ivec3 dims, int edge,
                               int slab) {
   const size_t planeVoxels = size_t(dims.x) * size_t(dims.y);
@@ -74,25 +75,26 @@ std::vector<uint8_t> markSlab(const CodeVisibility& visibility, const uint16_t* 
     plane->low.resize(planeVoxels);
     plane->high.resize(planeVoxels);
   }
-  const int first = std::max(slab * edge - 1, 0);
+  const int first = planesOfSlab(dims, edge, slab).first;
   const int last = std::min((slab + 1) * edge, dims.z) - 1;
-  rangesOfPlane(codes + size_t(first) * planeVoxels, dims, pairs, lower);
+  rangesOfPlane(codes, dims, pairs, lower);
   for (int z = first; z <= last; ++z) {
     const int above = std::min(z + 1, dims.z - 1);
-    rangesOfPlane(codes + size_t(above) * planeVoxels, dims, pairs, upper);
+    rangesOfPlane(codes + size_t(above - first) * planeVoxels, dims, pairs, upper);
     markBricks(visibility, lower, upper, dims, edge, marks);
     std::swap(lower, upper);
   }
   return marks;
 }
 
-uint32_t countVisible(const CodeVisibility& visibility, std::span<const uint16_t> codes, glm::ivec3 dims,
-                      glm::ivec3 position, int edge) {
+/// `codes`: of the planes from `firstPlane` on.
+uint32_t countVisible(const CodeVisibility& visibility, std::span<const uint16_t> codes, int firstPlane,
+                      glm::ivec3 dims, glm::ivec3 position, int edge) {
   const glm::ivec3 extent = brickExtent(position, dims, edge);
   uint32_t count = 0;
   for (int z = 0; z < extent.z; ++z) {
     for (int y = 0; y < extent.y; ++y) {
-      const uint16_t* row = codes.data() + linearIndex(position * edge + glm::ivec3(0, y, z), dims);
+      const uint16_t* row = codes.data() + linearIndex(position * edge + glm::ivec3(0, y, z - firstPlane), dims);
       for (int x = 0; x < extent.x; ++x)
         count += visibility.voxel(row[x]) ? 1u : 0u;
     }
@@ -115,32 +117,51 @@ glm::ivec3 brickExtent(glm::ivec3 position, glm::ivec3 dims, int edge) {
   return {std::min(rest.x, edge), std::min(rest.y, edge), std::min(rest.z, edge)};
 }
 
+PlaneRange planesOfSlab(glm::ivec3 dims, int edge, int slab) {
+  return {std::max(slab * edge - 1, 0), std::min((slab + 1) * edge + 1, dims.z)};
+}
+
+std::vector<StoredBrick> findStoredBricks(std::span<const uint16_t> codes, glm::ivec3 dims, int edge, int slab,
+                                          const CodeVisibility& visibility) {
+  const glm::ivec3 bricks = brickDims(dims, edge);
+  const int order = brickCurveOrder(dims, edge);
+  const int firstPlane = planesOfSlab(dims, edge, slab).first;
+  const std::vector<uint8_t> marks = markSlab(visibility, codes.data(), dims, edge, slab);
+  std::vector<StoredBrick> found;
+  for (int y = 0; y < bricks.y; ++y) {
+    for (int x = 0; x < bricks.x; ++x) {
+      if (marks[size_t(y) * size_t(bricks.x) + size_t(x)] == 0) continue;
+      const glm::ivec3 position(x, y, slab);
+      found.push_back(
+          {hilbertIndex(position, order), position, countVisible(visibility, codes, firstPlane, dims, position, edge)});
+    }
+  }
+  return found;
+}
+
 std::vector<StoredBrick> findStoredBricks(std::span<const uint16_t> codes, glm::ivec3 dims, int edge,
                                           const TransferFunction& transfer, const ValueCoding& coding) {
   check(validDims(dims) && edge >= 1, "dims and brick edge are positive");
   checkEqual(uint64_t(codes.size()), voxelCount(dims), "number of codes");
   const CodeVisibility visibility(transfer, coding);
-  const glm::ivec3 bricks = brickDims(dims, edge);
-  const int order = brickCurveOrder(dims, edge);
+  const size_t planeVoxels = size_t(dims.x) * size_t(dims.y);
   std::vector<StoredBrick> stored;
 #pragma omp parallel for schedule(dynamic)
-  for (int slab = 0; slab < bricks.z; ++slab) {
-    const std::vector<uint8_t> marks = markSlab(visibility, codes.data(), dims, edge, slab);
-    std::vector<StoredBrick> found;
-    for (int y = 0; y < bricks.y; ++y) {
-      for (int x = 0; x < bricks.x; ++x) {
-        if (marks[size_t(y) * size_t(bricks.x) + size_t(x)] == 0) continue;
-        const glm::ivec3 position(x, y, slab);
-        found.push_back(
-            {hilbertIndex(position, order), position, countVisible(visibility, codes, dims, position, edge)});
-      }
-    }
+  for (int slab = 0; slab < brickDims(dims, edge).z; ++slab) {
+    const PlaneRange planes = planesOfSlab(dims, edge, slab);
+    const auto window =
+        codes.subspan(size_t(planes.first) * planeVoxels, size_t(planes.last - planes.first) * planeVoxels);
+    const std::vector<StoredBrick> found = findStoredBricks(window, dims, edge, slab, visibility);
 #pragma omp critical(freevoxelStoredBricks)
     stored.insert(stored.end(), found.begin(), found.end());
   }
-  std::sort(stored.begin(), stored.end(),
-            [](const StoredBrick& a, const StoredBrick& b) { return a.hilbertIndex < b.hilbertIndex; });
+  sortAlongCurve(stored);
   return stored;
+}
+
+void sortAlongCurve(std::vector<StoredBrick>& bricks) {
+  std::sort(bricks.begin(), bricks.end(),
+            [](const StoredBrick& a, const StoredBrick& b) { return a.hilbertIndex < b.hilbertIndex; });
 }
 
 }  // namespace freevoxel

@@ -1,5 +1,5 @@
-// Attenuation of every voxel along the 26 lattice directions (papers/freevoxels section 3.1), plane by plane: a voxel's
-// depth is its neighbour's, one step further out, plus the segment between them.
+// Attenuation of every voxel along the 26 lattice directions (papers/freevoxels section 3.1), plane by plane, into
+// brick planes in curve order: a voxel's depth is its neighbour's, one step further out, plus the segment between them.
 #pragma once
 
 #include <cstdint>
@@ -10,15 +10,6 @@
 
 namespace freevoxel {
 
-/// Attenuation along one direction of `planes` z planes starting at `firstPlane`: bytes[((z - firstPlane) * dims.y + y)
-/// * dims.x + x], valid during the call.
-struct AttenuationSlab {
-  int direction = 0;
-  int firstPlane = 0;
-  int planes = 0;
-  std::span<const uint8_t> bytes;
-};
-
 /// The 26 directions are swept in two passes of 13, upwards through the planes for directions 0..12 and downwards for
 /// 13..25: opposite directions, and so the two halves of a file, never share one.
 inline constexpr int kSweepPasses = 2;
@@ -26,24 +17,56 @@ constexpr int sweepPass(int direction) {
   return direction / kDirectionsPerSection;
 }
 
-/// Takes what a sweep makes.
+/// Addresses of brick planes are multiples of this.
+inline constexpr size_t kBrickPlaneAlignment = 64;
+
+/// Where the attenuation of one brick goes.
+struct BrickPlanes {
+  glm::ivec3 position{0};     ///< voxel / edge
+  int hilbertState = 0;       ///< see hilbertState
+  uint8_t* planes = nullptr;  ///< the pass's 13 planes of edge^3 bytes each, along the curve; 255 outside the volume
+};
+
+/// Gives the value codes of successive planes, of one pass: slab after slab, upwards for pass 0, downwards for pass 1.
+class CodePlanes {
+ public:
+  virtual ~CodePlanes() = default;
+  /// Codes of planes first..first+count-1, x fastest, until the next call for the same pass. Called from one thread.
+  virtual std::span<const uint16_t> planes(int pass, int first, int count) = 0;
+  /// No more planes are asked for by this pass.
+  virtual void release(int /*pass*/) {}
+};
+
+/// All codes in memory.
+class StoredCodePlanes final : public CodePlanes {
+ public:
+  StoredCodePlanes(std::span<const uint16_t> codes, glm::ivec3 dims);
+  std::span<const uint16_t> planes(int pass, int first, int count) override;
+
+ private:
+  std::span<const uint16_t> codes_;
+  size_t planeVoxels_;
+};
+
+/// Takes what a sweep makes, slab by slab; slab k of a pass is its k-th row of bricks along z.
 class AttenuationSink {
  public:
   virtual ~AttenuationSink() = default;
-  /// Called once for every direction and slab, from many threads at once, in an order that is not fixed. Must not
-  /// throw.
-  virtual void receive(const AttenuationSlab& slab) = 0;
-  /// All directions of a pass have been received for the slab that starts at `firstPlane`, and nothing of the pass's
-  /// next slab yet. Called from one thread; ends the sweep if it throws.
-  virtual void complete(int pass, int firstPlane) = 0;
+  /// The bricks of a slab that are wanted, in any order. The planes must stay where they are until complete(). Called
+  /// from one thread.
+  virtual std::span<const BrickPlanes> begin(int pass, int slab) = 0;
+  /// All 13 planes of all bricks of the slab are filled. Called from one thread; ends the sweep if it throws.
+  virtual void complete(int pass, int slab) = 0;
 };
 
-/// Sweeps all 26 directions and hands every slab of `slabPlanes` planes (the topmost may be thinner) of every direction
-/// to `sink`. `codes` are dims.x * dims.y * dims.z value codes, x fastest. A voxel whose neighbour lies outside the
-/// volume has depth 0, A8 = 255.
-/// What the sink receives does not depend on the number of threads. Beside the codes this takes 72 bytes per voxel of
-/// an xy plane, and slabPlanes bytes per voxel of a plane and thread.
-void sweepAttenuation(std::span<const uint16_t> codes, glm::ivec3 dims, const SegmentDepth& segments, int slabPlanes,
-                      AttenuationSink& sink);
+/// Sweeps the directions of the passes `passes` (bit 0, bit 1) over bricks of `edge` voxels; both at once if both are
+/// asked for. A voxel whose neighbour lies outside the volume has depth 0, A8 = 255.
+/// What the sink receives depends neither on the number of threads nor on the instruction set. Takes sweepBytes().
+void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments, AttenuationSink& sink,
+                      unsigned passes = 3);
+
+/// Memory that sweepAttenuation takes beside codes and brick planes: 36 bytes per voxel of an xy plane and pass, and
+/// about 8 edge^2 bytes per voxel along x and thread.
+uint64_t sweepBytes(glm::ivec3 dims, int edge, int passCount, int threads);
 
 }  // namespace freevoxel

@@ -278,21 +278,32 @@ TransferFunction asLabels(const TransferFunction& transfer, const std::string& n
   return labels;
 }
 
+namespace {
+
+bool isTableWithoutValues(const std::string& path) {
+  return lowerCase(std::filesystem::path(path).extension().string()) == ".1dt";
+}
+
+void refuseUnlessFile(const std::string& nameOrPath) {
+  std::error_code ignored;
+  if (nameOrPath.find_first_of("./") != std::string::npos || std::filesystem::exists(nameOrPath, ignored)) return;
+  std::string names;
+  for (const TransferPreset& preset : transferPresets())
+    names += (names.empty() ? "" : ", ") + preset.name;
+  throw InputError(fmt::format("{}: is neither a file nor one of {}", nameOrPath, names));
+}
+
+}  // namespace
+
 TransferFunction chooseTransfer(const std::string& nameOrPath, const Volume& volume) {
   for (const TransferPreset& preset : transferPresets()) {
     if (preset.name != nameOrPath) continue;
     const TransferFunction transfer = preset.make(volume);
     return volume.header.labels ? asLabels(transfer, preset.name) : transfer;
   }
-  std::error_code ignored;
-  if (nameOrPath.find_first_of("./") == std::string::npos && !std::filesystem::exists(nameOrPath, ignored)) {
-    std::string names;
-    for (const TransferPreset& preset : transferPresets())
-      names += (names.empty() ? "" : ", ") + preset.name;
-    throw InputError(fmt::format("{}: is neither a file nor one of {}", nameOrPath, names));
-  }
+  refuseUnlessFile(nameOrPath);
   TransferFunction transfer = readTransferFunction(nameOrPath);
-  if (lowerCase(std::filesystem::path(nameOrPath).extension().string()) == ".1dt") {
+  if (isTableWithoutValues(nameOrPath)) {
     const Range range = rangeOf(volume);
     const bool fits = !isFloatingPoint(volume.header.type) && range.low >= 0.0 && range.high <= transfer.high;
     for (TransferPoint& point : transfer.points)
@@ -303,6 +314,20 @@ TransferFunction chooseTransfer(const std::string& nameOrPath, const Volume& vol
     }
   }
   return volume.header.labels ? asLabels(transfer, nameOrPath) : transfer;
+}
+
+TransferFunction chooseTransfer(const std::string& nameOrPath, const VolumeHeader& header) {
+  const auto& presets = transferPresets();
+  const bool preset = std::any_of(presets.begin(), presets.end(), [&](const auto& p) { return p.name == nameOrPath; });
+  if (!preset) refuseUnlessFile(nameOrPath);
+  if (preset || isTableWithoutValues(nameOrPath)) {
+    throw InputError(
+        fmt::format("{}: a transfer function made from the volume's values needs them all in memory; make a file of it "
+                    "with `freevoxel transfer`, or leave out --memory",
+                    nameOrPath));
+  }
+  const TransferFunction transfer = readTransferFunction(nameOrPath);
+  return header.labels ? asLabels(transfer, nameOrPath) : transfer;
 }
 
 }  // namespace freevoxel

@@ -34,4 +34,8 @@ TransferFunction asLabels(const TransferFunction& transfer, const std::string& n
 /// Of a volume of labels it is made a function of labels. Throws InputError.
 TransferFunction chooseTransfer(const std::string& nameOrPath, const Volume& volume);
 
+/// The same where values are not at hand: throws InputError for presets, and for tables without values, which are made
+/// from them.
+TransferFunction chooseTransfer(const std::string& nameOrPath, const VolumeHeader& header);
+
 }  // namespace freevoxel

@@ -27,7 +27,7 @@ struct Expected {
   PrecomputeOptions options;
   ValueCoding coding;
   std::vector<uint16_t> codes;
-  std::array<std::vector<uint8_t>, shared::kDirectionCount> planes;
+  test::Planes planes;
 };
 
 Expected expected(Volume volume, const TransferFunction& transfer, const PrecomputeOptions& options) {
@@ -35,13 +35,8 @@ Expected expected(Volume volume, const TransferFunction& transfer, const Precomp
   const glm::ivec3 dims = result.volume.header.dims;
   result.coding = valueCoding(result.volume.header.type, transfer.low, transfer.high);
   result.codes = encodeValues(result.volume, result.coding);
-  for (auto& plane : result.planes)
-    plane.resize(result.codes.size());
   const auto segments = makeSegmentDepth(options.classification, transfer, result.coding);
-  test::FunctionSink sink([&](const AttenuationSlab& slab) {
-    std::copy(slab.bytes.begin(), slab.bytes.end(), result.planes[size_t(slab.direction)].begin());
-  });
-  sweepAttenuation(result.codes, dims, *segments, dims.z, sink);
+  result.planes = test::sweepAll(result.codes, dims, *segments);
   return result;
 }
 

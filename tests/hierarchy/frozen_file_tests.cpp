@@ -41,11 +41,8 @@ void expectVersion1(const std::string& name, Layout layout, int tolerance) {
   ASSERT_EQ(file.brickCount(), 2u);
 
   const auto codes = encodeValues(volume, file.coding());
-  std::array<std::vector<uint8_t>, shared::kDirectionCount> planes;
-  test::FunctionSink sink([&](const AttenuationSlab& slab) {
-    planes[size_t(slab.direction)].assign(slab.bytes.begin(), slab.bytes.end());
-  });
-  sweepAttenuation(codes, dims, *makeSegmentDepth(Classification::voxel, transfer, file.coding()), dims.z, sink);
+  const auto segments = makeSegmentDepth(Classification::voxel, transfer, file.coding());
+  const test::Planes planes = test::sweepAll(codes, dims, *segments);
   for (size_t b = 0; b < file.brickCount(); ++b) {
     const BrickView brick = file.brick(b);
     for (size_t step = 0; step < brick.curve.size(); ++step) {

@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 #include <random>
 #include <vector>
 
+#include "precompute/sweep_kernels.h"
+#include "tests/precompute/instruction_sets.h"
 #include "volume/transfer_function.h"
 
 namespace freevoxel {
@@ -62,36 +65,58 @@ TEST(AttenuationCode, neverRisesWithDepth) {
 }
 
 /// Rows shorter, equal to and longer than any vector register, at odd addresses.
-TEST(FixedDepth, rowsAreLikeSingleDepths) {
+TEST(FixedDepth, rowsAreLookedUpLikeSingleCodes) {
   std::mt19937 random(3);
-  for (size_t count = 0; count < 70; ++count) {
-    std::vector<FixedDepth> next(count + 1), segments(count + 1), sums(count + 2, 1234u);
-    for (FixedDepth& depth : next)
-      depth = random() >> (random() % 12);
-    for (FixedDepth& depth : segments)
-      depth = random() >> (random() % 12);
-    std::vector<uint8_t> codes(count + 2, 99);
-    addDepths(next.data() + 1, segments.data() + 1, count, sums.data() + 1);
-    attenuationCodes(next.data() + 1, count, codes.data() + 1);
-    for (size_t i = 1; i <= count; ++i) {
-      ASSERT_EQ(sums[i], saturatingSum(next[i], segments[i]));
-      ASSERT_EQ(codes[i], attenuationCode(next[i]));
+  std::vector<FixedDepth> table(256 * 256);
+  for (FixedDepth& depth : table)
+    depth = random();
+  constexpr uint16_t kFirstVisible = 200;
+  for (size_t a = 0; a < kFirstVisible; ++a)
+    std::fill_n(table.begin() + ptrdiff_t(a * 256), kFirstVisible, 0);
+  for (const int64_t target : test::instructionSets()) {
+    const test::InstructionSet chosen(target);
+    for (size_t count = 0; count < 70; ++count) {
+      std::vector<uint16_t> codes(count + 1), nextCodes(count + 1);
+      for (size_t i = 0; i <= count; ++i) {
+        codes[i] = uint16_t(count % 2 == 0 ? random() & 255 : random() % kFirstVisible);
+        nextCodes[i] = uint16_t(count % 2 == 0 ? random() & 255 : random() % kFirstVisible);
+      }
+      std::vector<FixedDepth> single(count + 2, 1234u), pairs(count + 2, 1234u);
+      lookUpDepths(table.data(), codes.data() + 1, count, single.data() + 1);
+      lookUpDepthPairs(table.data(), codes.data() + 1, nextCodes.data() + 1, count, kFirstVisible, pairs.data() + 1);
+      for (size_t i = 1; i <= count; ++i) {
+        ASSERT_EQ(single[i], table[codes[i]]);
+        ASSERT_EQ(pairs[i], table[size_t(codes[i]) * 256 + nextCodes[i]]);
+      }
+      for (const auto& depths : {single, pairs}) {
+        EXPECT_EQ(depths.front(), 1234u);
+        EXPECT_EQ(depths.back(), 1234u);
+      }
     }
-    EXPECT_EQ(sums.front(), 1234u);
-    EXPECT_EQ(sums.back(), 1234u);
-    EXPECT_EQ(codes.front(), 99);
-    EXPECT_EQ(codes.back(), 99);
   }
 }
 
-TEST(AttenuationCode, rowsAreLikeSingleDepthsEverywhere) {
-  std::vector<FixedDepth> depths;
-  for (uint64_t depth = 0; depth < uint64_t(20) << 24; depth += 61)
-    depths.push_back(FixedDepth(depth));
-  std::vector<uint8_t> codes(depths.size());
-  attenuationCodes(depths.data(), depths.size(), codes.data());
-  for (size_t i = 0; i < depths.size(); ++i)
-    ASSERT_EQ(codes[i], attenuationCode(depths[i])) << depths[i];
+TEST(AttenuationCode, rowsAreLikeSingleDepthsForAllDepthsAndInstructionSets) {
+  constexpr int kWidth = 1 << 12, kRows = 4;
+  std::vector<FixedDepth> depths(size_t(kWidth) * kRows);
+  std::vector<uint32_t> words(kWidth);
+  const StripPart part{0, kWidth};
+  for (const int64_t target : test::instructionSets()) {
+    const test::InstructionSet chosen(target);
+    // A8 is made of the upper 20 bits; the lower ones must make no difference.
+    uint32_t next = 0;
+    while (next <= uint32_t(kLargestCodedDepth)) {
+      for (FixedDepth& depth : depths) {
+        depth = next << 8 | (next * 37 & 0xff);
+        ++next;
+      }
+      codeStrip(depths.data(), kWidth, kRows, kWidth, {&part, 1}, words.data());
+      for (size_t i = 0; i < depths.size(); ++i) {
+        const auto code = uint8_t(words[i % kWidth] >> (8 * (i / kWidth)));
+        ASSERT_EQ(code, attenuationCode(depths[i])) << depths[i] << ' ' << hwy::TargetName(target);
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -4,8 +4,11 @@
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
+#include <string>
 #include <utility>
 
 #include "base/error.h"
@@ -48,6 +51,79 @@ TEST(Precompute, sameBytesForAnyNumberOfThreads) {
     }
   }
   omp_set_num_threads(before);
+}
+
+/// A volume in memory, read slice by slice.
+class MemorySource final : public VolumeSource {
+ public:
+  explicit MemorySource(const Volume& volume) : volume_(volume) {}
+  const VolumeHeader& header() const override { return volume_.header; }
+  void readSlices(int count, std::span<std::byte> out) override {
+    ASSERT_EQ(out.size(), volume_.header.bytes() / uint64_t(volume_.header.dims.z) * uint64_t(count));
+    std::copy_n(volume_.data.begin() + ptrdiff_t(read_), out.size(), out.begin());
+    read_ += out.size();
+  }
+
+ private:
+  const Volume& volume_;
+  size_t read_ = 0;
+};
+
+struct LimitCase {
+  glm::ivec3 dims;
+  int edge;
+  ValueType type;
+};
+class MemoryLimit : public testing::TestWithParam<LimitCase> {};
+INSTANTIATE_TEST_SUITE_P(
+    Dims, MemoryLimit,
+    testing::Values(LimitCase{{5, 7, 11}, 8, ValueType::u8}, LimitCase{{33, 17, 50}, 8, ValueType::u8},
+                    LimitCase{{20, 41, 16}, 16, ValueType::f32}, LimitCase{{19, 3, 33}, 16, ValueType::u8},
+                    LimitCase{{40, 9, 70}, 32, ValueType::f32}, LimitCase{{1, 1, 1}, 8, ValueType::u8}));
+
+/// The least memory that an error asks for.
+uint64_t leastMemory(const Volume& volume, const TransferFunction& transfer, const std::string& path,
+                     PrecomputeOptions options) {
+  for (options.memoryBytes = 1;;) {
+    MemorySource source(volume);
+    try {
+      precompute(source, transfer, path, options, test::silentProgress());
+      return options.memoryBytes;
+    } catch (const MachineError& error) {
+      const std::string text = error.what();
+      const size_t at = text.find(" need ");
+      if (at == std::string::npos) throw;
+      const uint64_t needed = std::stoull(text.substr(at + 6));
+      if (needed <= options.memoryBytes) throw;
+      options.memoryBytes = needed;
+    }
+  }
+}
+
+TEST_P(MemoryLimit, doesNotChangeTheBytes) {
+  const auto [dims, edge, type] = GetParam();
+  const Volume volume = type == ValueType::u8 ? test::randomBytes(dims, 31)
+                                              : test::makeVolume<float>(type, dims, [](int x, int y, int z) {
+                                                  return float((x * 37 + y * 11 + z * 23) % 256) + 0.3f;
+                                                });
+  const std::string folder = test::temporaryFolder();
+  PrecomputeOptions options;
+  options.brickEdge = edge;
+  const auto expectedResult =
+      precompute(volume, test::veilAndRamp(), folder + "/whole.fvx", options, test::silentProgress());
+  const std::string expected = test::readBytes(folder + "/whole.fvx");
+  const uint64_t least = leastMemory(volume, test::veilAndRamp(), folder + "/limited.fvx", options);
+  EXPECT_TRUE(test::readBytes(folder + "/limited.fvx") == expected);
+  for (const uint64_t limit : {uint64_t(0), least * 2, least * 100}) {
+    options.memoryBytes = limit;
+    MemorySource source(volume);
+    const auto result =
+        precompute(source, test::veilAndRamp(), folder + "/limited.fvx", options, test::silentProgress());
+    EXPECT_TRUE(test::readBytes(folder + "/limited.fvx") == expected) << limit;
+    EXPECT_EQ(result.largestValueError, expectedResult.largestValueError);
+    EXPECT_EQ(result.visibleVoxels, expectedResult.visibleVoxels);
+  }
+  EXPECT_EQ(test::listFolder(folder).size(), 2u);
 }
 
 TEST(Precompute, reportsItsFiguresAndProgress) {

@@ -8,43 +8,19 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
-#include <map>
-#include <mutex>
-#include <utility>
+#include <span>
 #include <vector>
 
 #include "shaders/shared/directions.h"
+#include "tests/precompute/instruction_sets.h"
 #include "tests/precompute/test_volumes.h"
 #include "volume/value_codes.h"
 
 namespace freevoxel {
 namespace {
 
-using Planes = std::array<std::vector<uint8_t>, shared::kDirectionCount>;
-
-/// Attenuation of all voxels in volume order, per direction. Fails the test unless every byte arrives exactly once.
-Planes sweepAll(std::span<const uint16_t> codes, glm::ivec3 dims, const SegmentDepth& segments, int slabPlanes) {
-  Planes planes;
-  std::array<std::vector<int>, shared::kDirectionCount> times;
-  for (auto& plane : planes)
-    plane.resize(voxelCount(dims));
-  for (auto& counts : times)
-    counts.resize(size_t(dims.z));
-  test::FunctionSink sink([&](const AttenuationSlab& slab) {
-    const size_t planeVoxels = size_t(dims.x) * size_t(dims.y);
-    ASSERT_EQ(slab.bytes.size(), size_t(slab.planes) * planeVoxels);
-    ASSERT_EQ(slab.firstPlane % slabPlanes, 0);
-    auto& plane = planes[size_t(slab.direction)];
-    std::copy(slab.bytes.begin(), slab.bytes.end(), plane.begin() + ptrdiff_t(size_t(slab.firstPlane) * planeVoxels));
-    for (int i = 0; i < slab.planes; ++i)
-      ++times[size_t(slab.direction)][size_t(slab.firstPlane + i)];
-  });
-  sweepAttenuation(codes, dims, segments, slabPlanes, sink);
-  for (const auto& counts : times) {
-    EXPECT_TRUE(std::all_of(counts.begin(), counts.end(), [](int count) { return count == 1; }));
-  }
-  return planes;
-}
+using test::Planes;
+using test::sweepAll;
 
 bool inside(glm::ivec3 p, glm::ivec3 dims) {
   return p.x >= 0 && p.y >= 0 && p.z >= 0 && p.x < dims.x && p.y < dims.y && p.z < dims.z;
@@ -71,22 +47,22 @@ RayDepth marchRay(std::span<const uint16_t> codes, glm::ivec3 dims, glm::ivec3 p
 
 struct SweepCase {
   glm::ivec3 dims;
-  int slabPlanes;
+  int edge;
 };
 class Sweep : public testing::TestWithParam<SweepCase> {};
 INSTANTIATE_TEST_SUITE_P(Dims, Sweep,
                          testing::Values(SweepCase{{5, 7, 11}, 8}, SweepCase{{1, 1, 1}, 16}, SweepCase{{17, 3, 33}, 16},
-                                         SweepCase{{16, 16, 17}, 16}, SweepCase{{1, 9, 2}, 1}, SweepCase{{23, 1, 1}, 8},
-                                         SweepCase{{1, 1, 23}, 8}, SweepCase{{2, 3, 64}, 32},
-                                         SweepCase{{40, 2, 5}, 3}));
+                                         SweepCase{{16, 16, 17}, 16}, SweepCase{{1, 9, 2}, 8}, SweepCase{{23, 1, 1}, 8},
+                                         SweepCase{{1, 1, 23}, 8}, SweepCase{{2, 3, 64}, 32}, SweepCase{{3, 50, 2}, 16},
+                                         SweepCase{{70, 9, 5}, 32}, SweepCase{{33, 37, 20}, 16}));
 
 TEST_P(Sweep, equalsRaysMarchedOneByOne) {
-  const auto [dims, slabPlanes] = GetParam();
+  const auto [dims, edge] = GetParam();
   const Volume volume = test::randomBytes(dims, 11);
   const TransferFunction transfer = test::veilAndRamp();
   const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
   const auto codes = encodeValues(volume, coding);
-  const Planes planes = sweepAll(codes, dims, *makeSegmentDepth(Classification::voxel, transfer, coding), slabPlanes);
+  const Planes planes = sweepAll(codes, dims, *makeSegmentDepth(Classification::voxel, transfer, coding), edge);
   for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
     for (int z = 0; z < dims.z; ++z) {
       for (int y = 0; y < dims.y; ++y) {
@@ -102,13 +78,13 @@ TEST_P(Sweep, equalsRaysMarchedOneByOne) {
 }
 
 TEST_P(Sweep, preintegratedEqualsSegmentsAddedOneByOne) {
-  const auto [dims, slabPlanes] = GetParam();
+  const auto [dims, edge] = GetParam();
   const Volume volume = test::randomBytes(dims, 12);
   const TransferFunction transfer = test::veilAndRamp();
   const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
   const auto codes = encodeValues(volume, coding);
   const auto segments = makeSegmentDepth(Classification::preintegrated, transfer, coding);
-  const Planes planes = sweepAll(codes, dims, *segments, slabPlanes);
+  const Planes planes = sweepAll(codes, dims, *segments, edge);
   for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
     const glm::ivec3 step(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction));
     for (uint64_t i = 0; i < codes.size(); ++i) {
@@ -125,20 +101,26 @@ TEST_P(Sweep, preintegratedEqualsSegmentsAddedOneByOne) {
   }
 }
 
-TEST_P(Sweep, isTheSameForAnyNumberOfThreadsAndSlabs) {
-  const glm::ivec3 dims = GetParam().dims;
+TEST_P(Sweep, isTheSameForAnyNumberOfThreadsAndAnyInstructionSet) {
+  const auto [dims, edge] = GetParam();
   const Volume volume = test::randomBytes(dims, 13);
   const TransferFunction transfer = test::veilAndRamp();
   const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
   const auto codes = encodeValues(volume, coding);
-  const auto segments = makeSegmentDepth(Classification::voxel, transfer, coding);
   const int before = omp_get_max_threads();
-  omp_set_num_threads(1);
-  const Planes expected = sweepAll(codes, dims, *segments, dims.z);
-  for (const int threads : {2, 3, 8}) {
-    omp_set_num_threads(threads);
-    for (const int slabPlanes : {1, 2, 8, 64})
-      EXPECT_EQ(sweepAll(codes, dims, *segments, slabPlanes), expected);
+  for (const auto classification : {Classification::voxel, Classification::preintegrated}) {
+    const auto segments = makeSegmentDepth(classification, transfer, coding);
+    omp_set_num_threads(1);
+    const Planes expected = sweepAll(codes, dims, *segments, edge);
+    for (const int threads : {2, 3, 8}) {
+      omp_set_num_threads(threads);
+      for (const int other : {8, 16, 32})
+        EXPECT_EQ(sweepAll(codes, dims, *segments, other), expected);
+    }
+    for (const int64_t target : test::instructionSets()) {
+      const test::InstructionSet chosen(target);
+      EXPECT_EQ(sweepAll(codes, dims, *segments, edge), expected) << hwy::TargetName(target);
+    }
   }
   omp_set_num_threads(before);
 }
@@ -181,8 +163,8 @@ TEST(SweepClosedForm, opaqueRowSaturatesAndEmptyOneIsClear) {
   const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
   const auto segments = makeSegmentDepth(Classification::voxel, transfer, coding);
   const glm::ivec3 dims(300, 1, 2);
-  const Planes opaque = sweepAll(std::vector<uint16_t>(600, 255), dims, *segments, 16);
-  const Planes empty = sweepAll(std::vector<uint16_t>(600, 0), dims, *segments, 16);
+  const Planes opaque = sweepAll(std::vector<uint16_t>(600, 255), dims, *segments);
+  const Planes empty = sweepAll(std::vector<uint16_t>(600, 0), dims, *segments);
   const auto along = size_t(shared::directionIndex(1, 0, 0));
   for (size_t x = 0; x < 300; ++x) {
     EXPECT_EQ(opaque[along][x], x == 299 ? 255 : 0);
@@ -207,35 +189,57 @@ TEST(SweepClosedForm, singleOpaqueVoxelShadowsTheVoxelsBehindItOnly) {
   }
 }
 
-/// Checks the order of calls that AttenuationSink promises.
+/// Checks the order of calls that AttenuationSink promises, and wants every other brick only.
 class OrderSink final : public AttenuationSink {
  public:
-  explicit OrderSink(int slabPlanes) : slabPlanes_(slabPlanes) {}
-  void receive(const AttenuationSlab& slab) override {
-    const std::lock_guard lock(mutex_);
-    ++received_[{sweepPass(slab.direction), slab.firstPlane}];
+  OrderSink(glm::ivec3 dims, int edge) : all_(dims, edge) {}
+  std::span<const BrickPlanes> begin(int pass, int slab) override {
+    EXPECT_EQ(slab, pass == 0 ? begun[0] : last() - begun[1]);
+    EXPECT_EQ(begun[pass], completed[pass]);
+    ++begun[pass];
+    wanted_[pass].clear();
+    for (const BrickPlanes& brick : all_.begin(pass, slab)) {
+      if ((brick.position.x + brick.position.y) % 2 == 0) wanted_[pass].push_back(brick);
+    }
+    std::reverse(wanted_[pass].begin(), wanted_[pass].end());
+    return wanted_[pass];
   }
-  void complete(int pass, int firstPlane) override {
-    EXPECT_EQ((received_[{pass, firstPlane}]), kDirectionsPerSection);
-    EXPECT_EQ((received_.count({pass, firstPlane + (pass == 0 ? slabPlanes_ : -slabPlanes_)})), 0u);
-    ++completed;
+  void complete(int pass, int slab) override {
+    EXPECT_EQ(slab, pass == 0 ? completed[0] : last() - completed[1]);
+    ++completed[pass];
   }
-  int completed = 0;
+  static int last() { return 2; }
+  int begun[kSweepPasses] = {}, completed[kSweepPasses] = {};
+  const test::MemorySink& all() const { return all_; }
 
  private:
-  int slabPlanes_;
-  std::mutex mutex_;
-  std::map<std::pair<int, int>, int> received_;
+  test::MemorySink all_;
+  std::vector<BrickPlanes> wanted_[kSweepPasses];
 };
 
-TEST(SweepOrder, aPassCompletesSlabAfterSlab) {
-  const glm::ivec3 dims(5, 7, 11);
+TEST(SweepOrder, aPassCompletesSlabAfterSlabAndFillsWhatIsWanted) {
+  const glm::ivec3 dims(29, 23, 19);
   const TransferFunction transfer = test::veilAndRamp();
   const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
-  const std::vector<uint16_t> codes(voxelCount(dims));
-  OrderSink sink(4);
-  sweepAttenuation(codes, dims, *makeSegmentDepth(Classification::voxel, transfer, coding), 4, sink);
-  EXPECT_EQ(sink.completed, 2 * 3);
+  const auto codes = encodeValues(test::randomBytes(dims, 15), coding);
+  const auto segments = makeSegmentDepth(Classification::preintegrated, transfer, coding);
+  const Planes expected = sweepAll(codes, dims, *segments, 8);
+  for (const unsigned passes : {1u, 2u, 3u}) {
+    OrderSink sink(dims, 8);
+    StoredCodePlanes planes(codes, dims);
+    sweepAttenuation(planes, dims, 8, *segments, sink, passes);
+    for (int pass = 0; pass < kSweepPasses; ++pass)
+      EXPECT_EQ(sink.completed[pass], (passes >> pass & 1u) != 0 ? 3 : 0);
+    for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
+      if ((passes >> sweepPass(direction) & 1u) == 0) continue;
+      bool outside = false;
+      const auto found = sink.all().volumeOrder(direction, outside);
+      for (uint64_t i = 0; i < found.size(); ++i) {
+        const uint64_t x = i % uint64_t(dims.x) / 8, y = i / uint64_t(dims.x) % uint64_t(dims.y) / 8;
+        ASSERT_EQ(found[i], (x + y) % 2 == 0 ? expected[size_t(direction)][i] : 77);
+      }
+    }
+  }
 }
 
 }  // namespace

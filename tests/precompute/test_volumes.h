@@ -1,36 +1,102 @@
 // Volumes and transfer functions that the tests of the attenuation file share.
 #pragma once
 
+#include <gtest/gtest.h>
+
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <glm/vec3.hpp>
-#include <mutex>
 #include <random>
+#include <span>
 #include <utility>
 #include <vector>
 
+#include "precompute/hilbert.h"
+#include "precompute/stored_bricks.h"
 #include "precompute/sweep.h"
+#include "shaders/shared/directions.h"
 #include "volume/transfer_function.h"
 #include "volume/volume.h"
 
 namespace freevoxel::test {
 
-/// Calls a function with every slab of a sweep, one at a time.
-template <class F>
-class FunctionSink final : public AttenuationSink {
+/// Keeps all planes of all bricks.
+class MemorySink final : public AttenuationSink {
  public:
-  explicit FunctionSink(F f) : f_(std::move(f)) {}
-  void receive(const AttenuationSlab& slab) override {
-    const std::lock_guard lock(mutex_);
-    f_(slab);
+  MemorySink(glm::ivec3 dims, int edge) : dims_(dims), edge_(edge) {
+    const glm::ivec3 bricks = brickDims(dims, edge);
+    for (auto& pass : slabs_)
+      pass.resize(size_t(bricks.z));
+    bytes_.resize(voxelCount(bricks) * shared::kDirectionCount * brickBytes() / sizeof(Line));
+    uint8_t* next = bytes_.data()->bytes;
+    std::memset(next, 77, bytes_.size() * sizeof(Line));
+    for (auto& pass : slabs_) {
+      for (int z = 0; z < bricks.z; ++z) {
+        for (int y = 0; y < bricks.y; ++y) {
+          for (int x = 0; x < bricks.x; ++x) {
+            const glm::ivec3 position(x, y, z);
+            pass[size_t(z)].push_back({position, hilbertState(position, brickCurveOrder(dims, edge)), next});
+            next += kDirectionsPerSection * brickBytes();
+          }
+        }
+      }
+    }
   }
-  void complete(int, int) override {}
+  std::span<const BrickPlanes> begin(int pass, int slab) override { return slabs_[size_t(pass)][size_t(slab)]; }
+  void complete(int /*pass*/, int /*slab*/) override {}
+
+  /// Attenuation of every voxel along one direction, in volume order. `outside` is set to whether all of the bricks
+  /// that is outside the volume is 255.
+  std::vector<uint8_t> volumeOrder(int direction, bool& outside) const {
+    std::vector<uint8_t> result(voxelCount(dims_));
+    outside = true;
+    for (const auto& slab : slabs_[size_t(sweepPass(direction))]) {
+      for (const BrickPlanes& brick : slab) {
+        const uint8_t* plane = brick.planes + size_t(direction % kDirectionsPerSection) * brickBytes();
+        const auto curve = hilbertCurve(brick.hilbertState, std::countr_zero(unsigned(edge_)));
+        for (size_t step = 0; step < curve.size(); ++step) {
+          const glm::ivec3 p = brick.position * edge_ + glm::ivec3(curve[step].x, curve[step].y, curve[step].z);
+          if (p.x < dims_.x && p.y < dims_.y && p.z < dims_.z) {
+            result[linearIndex(p, dims_)] = plane[step];
+          } else {
+            outside = outside && plane[step] == kAttenuationOutside;
+          }
+        }
+      }
+    }
+    return result;
+  }
 
  private:
-  std::mutex mutex_;
-  F f_;
+  struct alignas(kBrickPlaneAlignment) Line {
+    uint8_t bytes[kBrickPlaneAlignment];
+  };
+  size_t brickBytes() const { return size_t(edge_) * size_t(edge_) * size_t(edge_); }
+
+  glm::ivec3 dims_;
+  int edge_;
+  std::vector<Line> bytes_;
+  std::array<std::vector<std::vector<BrickPlanes>>, kSweepPasses> slabs_;
 };
+
+using Planes = std::array<std::vector<uint8_t>, shared::kDirectionCount>;
+
+/// Attenuation of all voxels in volume order, per direction.
+inline Planes sweepAll(std::span<const uint16_t> codes, glm::ivec3 dims, const SegmentDepth& segments, int edge = 16) {
+  MemorySink sink(dims, edge);
+  StoredCodePlanes planes(codes, dims);
+  sweepAttenuation(planes, dims, edge, segments, sink);
+  Planes result;
+  for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
+    bool outside = false;
+    result[size_t(direction)] = sink.volumeOrder(direction, outside);
+    EXPECT_TRUE(outside);
+  }
+  return result;
+}
 
 /// A volume of type T whose values f(x, y, z) gives.
 template <class T, class F>
