@@ -76,7 +76,8 @@ int StoredAttenuation::nearest(glm::dvec3 voxel) const {
 
 DirectionSet StoredAttenuation::directions(size_t i) const {
   if (file_.layout() == Layout::dense) return kAllDirections;  // they cost nothing there
-  const glm::ivec3 first = file_.brickOrigin(i), last = glm::min(first + file_.brickEdge(), file_.dims()) - 1;
+  // Voxels of the brick beyond the volume are looked up too.
+  const glm::ivec3 first = file_.brickOrigin(i), last = first + (file_.brickEdge() - 1);
   const auto needed = [&](glm::dvec3 voxel) {
     return lookup_ == StoredLookup::nearest ? DirectionSet(1) << nearest(voxel)
                                             : directionsOf(directionTriangle(towards_.from(voxel)));

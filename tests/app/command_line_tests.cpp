@@ -80,7 +80,7 @@ TEST(CommandLine, usageErrorsExitTwoWithOneLine) {
       {"render a.fvx -o a.png --background puce", "'puce'"},
       {"render a.fvx -o a.png --background #12345", "'#12345'"},
       {"render a.fvx -o a.png --background 0,0,2", "'0,0,2'"},
-      {"render a.fvx -o a.png --formula guess", "normalised|direct|paper|raycast"},
+      {"render a.fvx -o a.png --formula guess", "normalised|direct|paper|blended|raycast"},
       {"render a.fvx -o a.png --step 0.5", "--formula raycast"},
       {"render a.fvx -o a.png --raycast pre", "--formula raycast"},
       {"render a.fvx -o a.png --formula raycast --step 0", "--step"},
