@@ -9,14 +9,12 @@ packages=(
   libegl-dev libepoxy-dev libegl-mesa0 libgl1-mesa-dri
   # mathematics, pictures, processes, SIMD, compression, checksums
   libglm-dev libopenimageio-dev libopenmpi-dev openmpi-bin libhwy-dev libzstd-dev zlib1g-dev libxxhash-dev
-  # files of others: OpenVDB (its headers want Boost's), DICOM
-  libopenvdb-dev libboost-dev libgdcm-dev
   # foreign volume formats (OpenVDB's headers want Boost's, and its package does not say so)
   libopenvdb-dev libboost-dev libgdcm-dev
   # command line, text
   libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   # tests and benchmarks
-  libgtest-dev libbenchmark-dev
+  libgtest-dev libbenchmark-dev gnuplot-nox
 )
 
 missing=()

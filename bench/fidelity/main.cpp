@@ -8,6 +8,7 @@
 #include <functional>
 
 #include "base/error.h"
+#include "bench/fidelity/figures.h"
 #include "bench/fidelity/tables.h"
 
 namespace freevoxel::bench {
@@ -59,9 +60,9 @@ int run(int argc, char** argv) {
   CLI::App app("measures the fidelity of freevoxel's pictures");
   Options options;
   int size = options.tables.imageSize.x;
-  app.add_option("TABLE", options.what, "what to measure")
+  app.add_option("TABLE", options.what, "what to measure; figures: what to draw")
       ->required()
-      ->check(CLI::IsMember({"quality", "shadows", "inside", "hidden", "lights"}));
+      ->check(CLI::IsMember({"quality", "shadows", "inside", "hidden", "lights", "figures"}));
   app.add_option("--data", options.tables.folders.data, "folder with the real volumes")->required();
   app.add_option("--transfers", options.tables.folders.transfers, "examples/transfer")->required();
   app.add_option("--cache", options.tables.folders.cache, "folder for references and attenuation files")->required();
@@ -70,10 +71,15 @@ int run(int argc, char** argv) {
   app.add_option("--size", size, "pictures are as many pixels wide and high")
       ->check(CLI::Range(16, 4096))
       ->capture_default_str();
-  app.add_option("-o,--output", options.output, "Markdown file; else stdout");
+  app.add_option("-o,--output", options.output, "Markdown file (default: stdout); of figures, a folder");
   CLI11_PARSE(app, argc, argv);
   options.tables.imageSize = glm::ivec2(size);
   std::filesystem::create_directories(options.tables.folders.cache);
+  if (options.what == "figures") {
+    if (options.output.empty()) throw InputError("figures: --output must name a folder");
+    drawFigures(options.output, options.tables.folders);
+    return 0;
+  }
   const std::string text = measure(options);
   if (options.output.empty()) {
     fmt::print("{}", text);
