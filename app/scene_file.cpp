@@ -71,7 +71,7 @@ void readView(const JsonPlace& camera, CameraOptions& options) {
     if (camera.has("eye")) camera.fail("expected either 'orbit' or 'eye', found both");
     const JsonPlace orbit = camera.member("orbit");
     orbit.size(2, 3, "[azimuth, elevation] or [azimuth, elevation, distance]");
-    options.orbit.emplace();
+    options.orbit = CameraOptions::OrbitDegrees();
     options.orbit->azimuth = orbit.element(0).number(-1e6, 1e6);
     options.orbit->elevation = orbit.element(1).number(-90.0, 90.0);
     if (orbit.size() == 3) options.orbit->distance = orbit.element(2).number(1e-30, kLargestPlace);

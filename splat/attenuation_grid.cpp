@@ -25,4 +25,11 @@ bool Towards::inside(glm::ivec3 dims) const {
          glm::all(glm::lessThan(index, glm::dvec3(dims) - 0.5));
 }
 
+void AttenuationGrid::setOpenFaces(const Towards& towards, glm::ivec3 dims) {
+  for (int axis = 0; axis < 3; ++axis) {
+    openLow[axis] = towards.index[axis] < (towards.directional ? 0.0 : -0.5);
+    openHigh[axis] = towards.index[axis] > (towards.directional ? 0.0 : dims[axis] - 0.5);
+  }
+}
+
 }  // namespace freevoxel

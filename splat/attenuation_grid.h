@@ -32,6 +32,11 @@ struct Towards {
 struct AttenuationGrid {
   static constexpr float kUnit = 65535.0f;
   std::vector<uint16_t> values;
+  /// Faces of the volume's box, lower and upper along each axis, that light from within passes on its way to the
+  /// target.
+  glm::bvec3 openLow{false}, openHigh{false};
+
+  void setOpenFaces(const Towards& towards, glm::ivec3 dims);
 };
 
 /// Cubes of 8 voxels an edge in which, or within a cell of which, something is visible; x fastest.

@@ -39,6 +39,22 @@ void gatherBlock(const ValueGrid& grid, const AttenuationGrid& attenuation, glm:
     codes[to] = grid.codes[from];
     attenuations[to] = attenuation.values[from];
   });
+  // Beyond the volume, towards the eye, nothing is in the way.
+  const int side = blockSide(edge);
+  const auto openLayer = [&](int axis, int layer) {
+    glm::ivec3 p;
+    const int b = (axis + 1) % 3, c = (axis + 2) % 3;
+    p[axis] = layer;
+    for (p[c] = 0; p[c] < side; ++p[c]) {
+      for (p[b] = 0; p[b] < side; ++p[b])
+        attenuations[linearIndex(p, glm::ivec3(side))] = uint16_t(AttenuationGrid::kUnit);
+    }
+  };
+  for (int axis = 0; axis < 3; ++axis) {
+    if (attenuation.openLow[axis] && origin[axis] == 0) openLayer(axis, 0);
+    for (int layer = grid.dims[axis] - origin[axis] + 1; attenuation.openHigh[axis] && layer < side; ++layer)
+      openLayer(axis, layer);
+  }
 }
 
 void gatherLight(const LightGrid& light, glm::ivec3 dims, glm::ivec3 origin, int edge, std::span<LightValue> lights) {

@@ -67,8 +67,7 @@ std::vector<Classified> classifyCodes(const ValueCoding& coding, const TransferF
   return classified;
 }
 
-/// A ray ends where less of its light than this would reach the eye. What stored attenuation says of a ray in between
-/// its directions is too rough to end it; there only whole blocks are left out.
+/// What less of its light than this would reach the eye from is hidden.
 constexpr float kHiddenBelow = 0x1p-12f;
 
 /// Whether no voxel that the block's rays may touch has attenuation of `threshold` (of AttenuationGrid::kUnit) or more.
@@ -221,8 +220,9 @@ Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, c
   frame.rays = &rays;
   frame.edge = kBlockEdge;
   frame.inverseQuantum = 1.0f / quantum;
+  // Stored attenuation, corrected or not, is too rough to end a ray.
   const bool endRays =
-      options.cull == Cull::hidden && statistics.attenuation != "stored" && statistics.attenuation != "quotient";
+      options.cull == Cull::hidden && statistics.attenuation == attenuationSourceName(AttenuationSource::swept);
   frame.hiddenBelow = endRays ? kHiddenBelow : 0.0f;
   const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, statistics);
   statistics.setupSeconds += secondsSince(setupStart);

@@ -195,6 +195,7 @@ AttenuationGrid storedAttenuation(const AttenuationFile& file, const Towards& to
   const StoredAttenuation stored(file, towards, lookup);
   AttenuationGrid result;
   result.values.assign(voxelCount(dims), uint16_t(AttenuationGrid::kUnit));
+  result.setOpenFaces(towards, dims);
   const auto lookUpBrick = [&](size_t b) {
     const BrickView brick = file.brick(b, stored.directions(b));
     std::vector<float> attenuation(brick.curve.size());

@@ -274,6 +274,7 @@ AttenuationGrid sweptAttenuation(const ValueGrid& grid, const ClassificationTabl
                                  const Towards& towards) {
   AttenuationGrid result;
   result.values.assign(grid.codes.size(), 65535);
+  result.setOpenFaces(towards, grid.dims);
   const glm::dvec3 size = glm::abs(towards.index);
   const int dominant = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
   for (int axis = 0; axis < 3; ++axis) {

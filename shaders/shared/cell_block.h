@@ -50,6 +50,28 @@ SHARED_FUNCTION CellPlace cellPlace(PixelRay ray, CellLayout layout_, int k, flo
   return place;
 }
 
+// The same for attenuation, which does not end at the outermost voxels: half a voxel beyond them, where the volume ends
+// towards the eye, nothing is in the way, and the apron says so.
+SHARED_FUNCTION CellPlace attenuationPlace(PixelRay ray, CellLayout layout_, int k, float t) {
+  EXACT float s = float(k) + t;
+  EXACT float b = ray.baseB + s * ray.slopeB;
+  EXACT float c = ray.baseC + s * ray.slopeC;
+  b = min(max(b, -0.5f), layout_.lastB + 0.5f);
+  c = min(max(c, -0.5f), layout_.lastC + 0.5f);
+  EXACT float fromApronB = b + 1.0f;
+  EXACT float fromApronC = c + 1.0f;
+  int wholeB = int(fromApronB);
+  int wholeC = int(fromApronC);
+  CellPlace place;
+  place.voxel = (k - layout_.originA + 1) * layout_.strideA + (wholeB - layout_.originB) * layout_.strideB +
+                (wholeC - layout_.originC) * layout_.strideC;
+  EXACT float restB = fromApronB - float(wholeB);
+  EXACT float restC = fromApronC - float(wholeC);
+  place.tb = restB;
+  place.tc = restC;
+  return place;
+}
+
 SHARED_FUNCTION float planePlace(BLOCK_ACCESS CellLayout layout_, CellPlace at, int voxel) {
   EXACT float low = mixExact(blockPlace(BLOCK_HAND_ON voxel), blockPlace(BLOCK_HAND_ON voxel + layout_.strideB), at.tb);
   EXACT float high = mixExact(blockPlace(BLOCK_HAND_ON voxel + layout_.strideC),
@@ -76,7 +98,7 @@ SHARED_FUNCTION float rayPlace(BLOCK_ACCESS PixelRay ray, CellLayout layout_, in
 }
 
 SHARED_FUNCTION float rayAttenuation(BLOCK_ACCESS PixelRay ray, CellLayout layout_, int k, float t) {
-  CellPlace at = cellPlace(ray, layout_, k, t);
+  CellPlace at = attenuationPlace(ray, layout_, k, t);
   EXACT float low = planeAttenuation(BLOCK_HAND_ON layout_, at, at.voxel);
   EXACT float high = planeAttenuation(BLOCK_HAND_ON layout_, at, at.voxel + layout_.strideA);
   return mixExact(low, high, t);
@@ -84,7 +106,7 @@ SHARED_FUNCTION float rayAttenuation(BLOCK_ACCESS PixelRay ray, CellLayout layou
 
 // The largest attenuation of the eight voxels around position k + t.
 SHARED_FUNCTION float largestAttenuation(BLOCK_ACCESS PixelRay ray, CellLayout layout_, int k, float t) {
-  CellPlace at = cellPlace(ray, layout_, k, t);
+  CellPlace at = attenuationPlace(ray, layout_, k, t);
   float largest = 0.0f;
   for (int corner = 0; corner < 8; ++corner) {
     int voxel = at.voxel + ((corner & 1) != 0 ? layout_.strideB : 0) + ((corner & 2) != 0 ? layout_.strideC : 0) +
