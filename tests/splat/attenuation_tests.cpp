@@ -6,6 +6,7 @@
 #include <glm/glm.hpp>
 
 #include "splat/attenuation_grid.h"
+#include "splat/coarse_volume.h"
 #include "splat/stored_attenuation.h"
 #include "tests/splat/scene.h"
 
@@ -115,6 +116,59 @@ TEST(SweptAttenuation, AgreesWithMarchedRaysBetterThanStored) {
     EXPECT_LT(std::sqrt(storedSquares / count), 0.2);  // 26 directions, 45 degrees apart
     EXPECT_LT(sweptSquares, 0.1 * storedSquares);
   }
+}
+
+// A translucent ball: what 26 directions miss is large and smooth, which the coarse copy sees.
+TEST(CorrectedAttenuation, IsNearerToMarchedRaysThanStored) {
+  TransferFunction transfer;
+  transfer.points = {{0.0, glm::dvec3(1.0), 0.0}, {255.0, glm::dvec3(1.0), 0.08}};
+  const Scene scene = makeScene(makeVolume({45, 39, 33}, {1.0, 1.1, 1.3},
+                                           [](int x, int y, int z) {
+                                             const glm::dvec3 p = (glm::dvec3(x, y, z) - glm::dvec3(20, 21, 15)) /
+                                                                  glm::dvec3(18, 15, 13);
+                                             return glm::length(p) < 1.0 ? 220 - 5 * (x % 3) : 0;
+                                           }),
+                                transfer, 16, Classification::preintegrated);
+  const ValueGrid grid = scene.grid();
+  std::vector<Classified> ofCode;
+  for (uint32_t code = 0; code <= grid.coding.largest; ++code)
+    ofCode.push_back(transfer.at(grid.coding.decode(code)));
+  const CoarseVolume coarse(grid, ofCode);
+  for (const Towards& target :
+       {Towards::direction(grid.placement, {0.4, 1.0, -0.65}), Towards::point(grid.placement, {120.0, 60.0, -70.0})}) {
+    const AttenuationGrid stored = storedAttenuation(*scene.file, target, StoredLookup::interpolated);
+    AttenuationGrid corrected = stored;
+    coarse.correct(target, corrected);
+    double storedSquares = 0.0, correctedSquares = 0.0;
+    for (int i = 0; i < 300; ++i) {
+      const glm::ivec3 p(4 + (i * 7) % 37, 8 + (i * 13) % 27, 4 + (i * 29) % 25);
+      if (grid.codes[linearIndex(p, grid.dims)] == 0) continue;
+      const double expected = marched(grid, transfer, target, p);
+      storedSquares += std::pow(attenuationAt(stored, p, grid.dims) - expected, 2);
+      correctedSquares += std::pow(attenuationAt(corrected, p, grid.dims) - expected, 2);
+    }
+    // 6 dB nearer: on embryo it is 9 dB (docs/fidelity.md).
+    EXPECT_LT(correctedSquares, 0.25 * storedSquares);
+  }
+}
+
+// The paper's A_B / A_V: along a lattice direction the quotient is what lies between the two voxels.
+TEST(StoredAttenuation, QuotientIsWhatLiesBeforeAnEyeInside) {
+  const Scene scene = waves();
+  const ValueGrid grid = scene.grid();
+  const glm::dvec3 eye(12.0, 14.0, 20.0);
+  const Towards target = Towards::point(grid.placement, eye * grid.placement.spacing);
+  const AttenuationGrid quotient = storedAttenuation(*scene.file, target, StoredLookup::quotient);
+  const AttenuationGrid stored = storedAttenuation(*scene.file, target, StoredLookup::interpolated);
+  double quotientError = 0.0, storedError = 0.0;
+  for (const int x : {2, 5, 8, 16, 20, 25}) {
+    const double expected = marched(grid, scene.transfer, target, {x, 14, 20});
+    quotientError += std::abs(attenuationAt(quotient, {x, 14, 20}, grid.dims) - expected);
+    storedError += std::abs(attenuationAt(stored, {x, 14, 20}, grid.dims) - expected);
+  }
+  EXPECT_LT(quotientError / 6.0, 0.02);  // codes are 1/255 apart, and are divided
+  EXPECT_GT(storedError, 3.0 * quotientError) << "stored runs on to the outside";
+  EXPECT_EQ(attenuationAt(quotient, {12, 14, 20}, grid.dims), 1.0) << "the eye's own voxel";
 }
 
 TEST(SweptAttenuation, SameForAnyThreadCount) {

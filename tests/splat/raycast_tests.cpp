@@ -183,6 +183,57 @@ TEST(Raycast, EyeInsideSeesOnlyWhatIsAhead) {
   EXPECT_NEAR(picture.at(1, 1)[3], 1.0 - std::pow(0.9, 10.5), 1e-5);
 }
 
+// An opaque plate between lamp and floor: its shadow, and nothing else, is dark.
+TEST(Raycast, MarchesShadows) {
+  TransferFunction transfer;
+  transfer.points = {{0.0, glm::dvec3(1.0), 0.0}, {1.0, glm::dvec3(1.0), 0.0}, {100.0, glm::dvec3(1.0), 1.0}};
+  const Volume volume = makeVolume({41, 33, 21}, glm::dvec3(1.0), [](int x, int y, int z) {
+    const bool plate = z == 15 && x >= 14 && x < 27 && y >= 10 && y < 23;
+    return plate || z <= 2 ? 255 : 0;
+  });
+  const ValueGrid grid = valueGrid(volume, transfer);
+  RaycastOptions options;
+  options.lighting.ambient = 0.25f;
+  options.lighting.lights = {{true, {0.0, 0.0, 1.0}, glm::vec3(0.5f)}};
+  // From the side and above, so that the floor beneath the plate is seen.
+  Camera camera;
+  camera.eye = {20.0, -60.0, 40.0};
+  camera.target = {20.0, 16.0, 3.0};
+  camera.up = {0.0, 0.0, 1.0};
+  camera.imageSize = {160, 120};
+  const Image lit = raycast(grid, transfer, camera, options, silentProgress());
+  const ViewFrame frame = viewFrame(camera);
+  const auto lightAt = [&](glm::dvec3 world) {
+    const glm::ivec2 pixel(project(frame, world)->pixel);
+    return lit.at(pixel.x, pixel.y)[0];
+  };
+  EXPECT_NEAR(lightAt({20.0, 12.0, 2.5}), 0.25, 0.02) << "beneath the plate: ambient light only";
+  // Matter shadows itself: with the eye at an angle whose cosine is 0.46, light that falls straight down loses
+  // 1 - 1 / (1 + 0.46) of itself on the way to the depths that the eye sees, if extinction is constant there.
+  EXPECT_NEAR(lightAt({5.0, 12.0, 2.5}), 0.25 + 0.5 / 1.46, 0.05) << "beside it";
+  options.lighting.lights.clear();
+  options.lighting.ambient = 1.0f;
+  EXPECT_NEAR(raycast(grid, transfer, camera, options, silentProgress()).at(80, 60)[3], 1.0f, 1e-6);
+}
+
+TEST(Raycast, TransmittanceOfAUniformBoxIsBeerLambert) {
+  const Volume volume = makeVolume({25, 17, 21}, {1.0, 1.5, 2.0}, [](int, int, int) { return 255; });
+  const TransferFunction transfer = uniformOpacity(0.05);
+  const ValueGrid grid = valueGrid(volume, transfer);
+  const std::vector<glm::dvec3> positions = {{12.0, 8.0, 10.0}, {0.0, 0.0, 0.0}, {24.0, 3.0, 20.0}};
+  const std::vector<float> found =
+      marchTransmittance(grid, transfer, positions, Towards::direction(grid.placement, {0.0, 1.0, 0.0}), 0.1);
+  for (size_t i = 0; i < positions.size(); ++i) {
+    const double length = (16.5 - positions[i].y) * 1.5;
+    EXPECT_NEAR(found[i], std::pow(0.95, length), 1e-4);
+  }
+  // A lamp 3 voxels away: no further.
+  EXPECT_NEAR(marchTransmittance(grid, transfer, std::vector<glm::dvec3>{{12.0, 8.0, 10.0}},
+                                 Towards::point(grid.placement, {15.0, 12.0, 20.0}), 0.1)
+                  .front(),
+              std::pow(0.95, 3.0), 1e-4);
+}
+
 TEST(Raycast, StepMustBePositive) {
   const Scene scene = awkwardScene();
   const Camera camera = randomViews(scene.bounds(), 1, {3, 3}).front();
