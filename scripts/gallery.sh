@@ -40,8 +40,8 @@ draw cthead "$raw/cthead_256x256x113_uint16_be.raw.gz --dims 256,256,113 --type 
   cthead.json -0.6,-1,-0.3 0,0,-1 "--fov 25 --shading phong --light-direction -1,-0.7,-1 --ambient 0.35"
 draw headsq "$raw/headsq/quarter.nhdr" headsq.json -0.6,-1,-0.3 0,0,-1 \
   "--fov 26 --shading phong --light-direction -1,-0.7,-1 --ambient 0.35"
-draw dicom_t1w "$raw/dicom_t1w" dicom_t1w.json 0.8,1,0.2 0,0,1 \
-  "--fov 24 --shading phong --light-direction 1,0.6,1 --ambient 0.25"
+draw dicom_t1w "$raw/dicom_t1w" dicom_t1w.json -0.9,0.35,0.1 0,0,1 \
+  "--fov 24 --light-direction -0.5,0.3,1 --ambient 0.6"
 draw brain "$raw/brain_ch256.nii.gz" brain.json -0.8,0.8,0.6 0,0,1 \
   "--fov 24 --shading phong --light-direction -1,0.2,1.2 --ambient 0.3"
 draw avg152 "$raw/avg152T1_RL_bigendian.nii.gz" avg152.json 0.25,-0.35,-1 0,1,0 \
@@ -56,7 +56,8 @@ draw carp "$raw/carp.nii.gz" carp.json 1,0.25,0.35 0,0,1 \
   "--fov 29 --shading phong --light-direction 1,0.2,0.8 --ambient 0.35"
 draw embryo "$raw/embryo_256x256x256_uint8.raw.gz --dims 256,256,256 --type u8" embryo.json 0.5,0.4,1 0,1,0 \
   "--fov 15 --shading phong --light-direction -0.2,1,0.8 --ambient 0.3"
-draw frogtissue "$raw/frogtissue/frogtissue.mhd --labels" frogtissue.json 0.2,-0.5,-1 0,-1,0 "--fov 27"
+draw frogtissue "$raw/frogtissue/frogtissue.mhd --labels" frogtissue.json 0.2,-0.5,-1 0,-1,0 \
+  "--fov 27 --light-direction -0.7,-0.5,-0.8 --ambient 0.35"
 draw hydrogen "$raw/hydrogen_atom_128x128x128_uint8.raw.gz --dims 128,128,128 --type u8" hydrogen.json 1,0.35,0.45 \
   0,0,1 "--fov 20"
 draw neghip "$raw/neghip.mha" neghip.json 0.6,0.4,1 0,1,0 "--fov 22"
