@@ -81,7 +81,7 @@ std::span<const BrickPlanes> BrickWriter::begin(int pass, int slab) {
   auto& wanted = wanted_[size_t(pass)];
   wanted.clear();
   planes_[size_t(pass)].resize(passBytes() / sizeof(Line));
-  uint8_t* planes = planes_[size_t(pass)].data()->bytes;
+  uint8_t* planes = reinterpret_cast<uint8_t*>(planes_[size_t(pass)].data());
   for (const size_t i : slabs_[size_t(slab)]) {
     wanted.push_back({bricks_[i].position, states_[i], planes});
     planes += kDirectionsPerSection * brickVoxels();

@@ -25,7 +25,7 @@ class Rows {
  public:
   Rows() = default;
   Rows(int count, int width) : stride_(size_t(width) + 2 * kRowUnit), lines_(size_t(count) * stride_ / kRowUnit) {}
-  FixedDepth* row(int i) { return lines_.data()->depths + size_t(i) * stride_ + kRowUnit; }
+  FixedDepth* row(int i) { return reinterpret_cast<FixedDepth*>(lines_.data()) + size_t(i) * stride_ + kRowUnit; }
   size_t stride() const { return stride_; }
 
  private:
