@@ -73,14 +73,15 @@ TEST_P(Killed, leavesNoFileThatLooksWhole) {
     options.signal = SIGKILL;
     // Every other one late, where the writing is: on a busy machine `whole` says little.
     options.signalAfter = whole * std::uniform_real_distribution<double>(attempt % 2 == 0 ? 0.05 : 0.5, 1.0)(random);
-    if (runProcess(program, options).status != 128 + SIGKILL) {
+    const bool whileRunning = runProcess(program, options).status == 128 + SIGKILL;
+    // Killed too late, on its way out: what is there is whole.
+    if (!whileRunning || std::filesystem::exists(folder + "/a.fvx")) {
       EXPECT_TRUE(temporaries(folder).empty());
       freevoxelDone(folder, {"verify", "a.fvx"});
       std::filesystem::remove(folder + "/a.fvx");
       continue;
     }
     ++killed;
-    EXPECT_FALSE(std::filesystem::exists(folder + "/a.fvx"));
     const std::vector<std::string> left = temporaries(folder);
     EXPECT_LE(left.size(), 1u) << "the run before has removed what the one before it left";
     whileWriting += left.empty() ? 0 : 1;
