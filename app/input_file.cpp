@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "base/atomic_file.h"
+#include "base/error.h"
 #include "precompute/format.h"
 
 namespace freevoxel {
@@ -14,7 +16,11 @@ bool isAttenuationFile(const std::string& path) {
   std::array<uint8_t, kFileMagic.size()> start{};
   std::ifstream file(path, std::ios::binary);
   file.read(reinterpret_cast<char*>(start.data()), start.size());
-  return file.good() && start == kFileMagic;
+  if (!file.good() || start != kFileMagic) return false;
+  if (isTemporaryName(path)) {
+    throw InputError(fmt::format("{}: the unfinished file of a run that is at work or was killed; run it again", path));
+  }
+  return true;
 }
 
 uint64_t fileBytes(const std::string& path) {

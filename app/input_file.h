@@ -6,7 +6,8 @@
 
 namespace freevoxel {
 
-/// Whether this is a file that starts like an attenuation file.
+/// Whether this is a file that starts like an attenuation file. Throws InputError for one that a run has not finished,
+/// which may look whole in the moment before it gets its name.
 bool isAttenuationFile(const std::string& path);
 
 /// Size of the file itself, without others it may name; of a folder, its files; 0 for a name that stands for several.

@@ -109,6 +109,14 @@ int makeTemporary(std::string& name, size_t extensionBytes) {
 
 }  // namespace
 
+bool isTemporaryName(const std::string& path) {
+  const std::string name = std::filesystem::path(path).filename().string();
+  const size_t mark = name.rfind(kMark);
+  if (!name.starts_with('.') || mark == std::string::npos) return false;
+  const std::string_view rest = std::string_view(name).substr(mark + kMark.size());
+  return rest.size() == kRandomCharacters || (rest.size() > kRandomCharacters && rest[kRandomCharacters] == '.');
+}
+
 void removeTemporaryFiles() noexcept {
   for (const std::atomic<const char*>& slot : temporaries) {
     if (const char* path = slot.load(); path != nullptr) unlink(path);

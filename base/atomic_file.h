@@ -48,4 +48,7 @@ class AtomicFile {
 /// unlink.
 void removeTemporaryFiles() noexcept;
 
+/// Whether a file's name is one that an AtomicFile gives until it is committed: a run that was killed may leave it.
+bool isTemporaryName(const std::string& path);
+
 }  // namespace freevoxel

@@ -191,5 +191,15 @@ TEST(MappedFileDeathTest, otherBusErrorsEndTheProgram) {
   EXPECT_DEATH(EXPECT_EQ(unguarded.bytes()[0], std::byte(1)), "");
 }
 
+TEST(AtomicFile, KnowsTheNamesOfItsTemporaryFiles) {
+  const std::string folder = test::temporaryFolder();
+  const AtomicFile file(folder + "/a.fvx");
+  EXPECT_TRUE(isTemporaryName(file.temporaryPath()));
+  const AtomicFile nested(file.temporaryPath());
+  EXPECT_TRUE(isTemporaryName(nested.temporaryPath()));
+  for (const char* name : {"a.fvx", ".a.fvx", "a.partial-abcdef.fvx", ".a.partial-abc.fvx", ""})
+    EXPECT_FALSE(isTemporaryName(folder + "/" + name)) << name;
+}
+
 }  // namespace
 }  // namespace freevoxel
