@@ -67,7 +67,7 @@ TEST_P(Killed, leavesNoFileThatLooksWhole) {
 
   std::mt19937 random(51);
   int killed = 0, whileWriting = 0;
-  for (int attempt = 0; attempt < 60 && (killed < 10 || whileWriting < 5); ++attempt) {
+  for (int attempt = 0; attempt < 150 && (killed < 10 || whileWriting < 5); ++attempt) {
     ProcessOptions options;
     options.folder = folder;
     options.signal = SIGKILL;
