@@ -17,6 +17,7 @@ enum class Outcome { done, failed };
 struct Command {
   CLI::App* parser;
   std::function<Outcome(Session&)> run;
+  bool shared = false;  ///< several ranks share its work; otherwise rank 0 does it alone
 };
 
 /// A subcommand with its one line of description and an example, common options to be added last.

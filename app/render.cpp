@@ -1,7 +1,11 @@
 // freevoxel render: a picture of an attenuation file or a volume.
 #include <fmt/format.h>
 
+#include <chrono>
+#include <filesystem>
+#include <functional>
 #include <memory>
+#include <numbers>
 
 #include "app/command.h"
 #include "app/input_file.h"
@@ -9,9 +13,11 @@
 #include "app/picture_output.h"
 #include "app/precompute_report.h"
 #include "app/scene_file.h"
+#include "app/shared_drawing.h"
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "hierarchy/attenuation_file.h"
+#include "precompute/checksums.h"
 #include "splat/raycast.h"
 #include "splat/splat.h"
 #include "volume/read_volume.h"
@@ -20,6 +26,8 @@
 namespace freevoxel {
 
 namespace {
+
+constexpr int kMostFrames = 9999;
 
 enum class PictureFormula { paper, direct, normalised, blended, raycast };
 
@@ -34,6 +42,8 @@ struct RenderOptions {
   BlendKernel blendKernel = BlendKernel::normalised;
   Backend backend = Backend::automatic;
   RaycastOptions raycast;
+  ShareOptions share;
+  int frames = 0;  ///< of a turntable; 0: one picture
 };
 
 Formula splatFormula(PictureFormula formula) {
@@ -82,6 +92,7 @@ void checkOptions(const RenderOptions& options, const CLI::App& command) {
   onlyWith(options.formula != PictureFormula::raycast, {"--light-attenuation"}, "normalised, direct, paper or blended");
   onlyWith(options.formula == PictureFormula::raycast, {"--raycast", "--step", "--shadow-step"}, "raycast");
   onlyWith(options.formula == PictureFormula::blended, {"--blend-kernel"}, "blended");
+  onlyWith(hasSums(options.formula), {"--partition", "--composite", "--colour-by"}, "normalised, direct or paper");
   checkOutputName(options.picture);
   if (!options.sums.empty() && lowerCaseExtension(options.sums) != "exr") {
     throw UsageError(fmt::format("--sums: expected a name ending in .exr, found '{}'", options.sums));
@@ -143,41 +154,88 @@ void report(const SplatStatistics& statistics, const ValueGrid& grid, const Atte
   session.statistics["hiddenBlocks"] = statistics.hiddenBlocks;
 }
 
-Image drawRays(const ValueGrid& grid, const TransferFunction& transfer, const RenderOptions& options,
-               Session& session) {
-  const Camera camera = makeCamera(options.camera, worldBounds(grid.placement, grid.dims));
-  return session.timed("raycast", [&] { return raycast(grid, transfer, camera, options.raycast, session.progress()); });
+/// The name of one of several pictures: "turn.png" -> "turn_0007.png".
+std::string frameName(const std::string& path, int frame) {
+  const std::filesystem::path name(path);
+  return (name.parent_path() / fmt::format("{}_{:04}{}", name.stem().string(), frame, name.extension().string()))
+      .string();
+}
+
+/// Draws the picture, or those of a turn about world y, and writes them on rank 0. `draw(camera)`: the picture, and if
+/// there are any its sums.
+void drawFrames(const RenderOptions& options, const ValueGrid& grid, Session& session,
+                const std::function<Image(const Camera& camera, std::optional<Sums>& sums)>& draw) {
+  const Camera first = makeCamera(options.camera, worldBounds(grid.placement, grid.dims));
+  nlohmann::ordered_json seconds = nlohmann::ordered_json::array();
+  for (int frame = 0; frame < std::max(1, options.frames); ++frame) {
+    const auto start = std::chrono::steady_clock::now();
+    const bool turning = options.frames > 0;
+    const Camera camera =
+        turning ? turned(first, 2.0 * std::numbers::pi * frame / options.frames, {0.0, 1.0, 0.0}) : first;
+    std::optional<Sums> sums;
+    Image picture = draw(camera, sums);
+    seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    if (!session.ranks().isRoot()) continue;
+    const auto named = [&](const std::string& path) { return turning ? frameName(path, frame) : path; };
+    if (!options.sums.empty()) {
+      session.timed("write", [&] {
+        writeExr(named(options.sums), sums.value().image, sumChannelNames(), session.imageMetadata());
+      });
+    }
+    PictureOptions output = options.picture;
+    output.output = named(output.output);
+    writePicture(output, std::move(picture), session);
+  }
+  if (options.frames > 0) session.statistics["frameSeconds"] = seconds;
+}
+
+void drawRays(const ValueGrid& grid, const TransferFunction& transfer, const RenderOptions& options, Session& session) {
+  drawFrames(options, grid, session, [&](const Camera& camera, std::optional<Sums>&) {
+    return session.timed("raycast",
+                         [&] { return raycast(grid, transfer, camera, options.raycast, session.progress()); });
+  });
 }
 
 /// `file` may be null: then attenuation is swept.
-Image drawSplats(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer,
-                 const RenderOptions& options, Session& session) {
-  const Camera camera = makeCamera(options.camera, worldBounds(grid.placement, grid.dims));
+void drawSplats(const ValueGrid& grid, const AttenuationFile* file, TransferFunction transfer,
+                const RenderOptions& options, Session& session) {
+  expectSameOnAllRanks(session.ranks(),
+                       file != nullptr ? file->identity() : contentHash(std::as_bytes(std::span(grid.codes))),
+                       options.input);
+  if (options.share.colourByRank) {
+    for (TransferPoint& point : transfer.points)
+      point.srgb = glm::dvec3(1.0);
+  }
   Splatter splatter = session.timed("open", [&] { return Splatter(grid, file, transfer, options.backend); });
   if (options.formula == PictureFormula::blended) {
-    BlendedResult result = splatter.renderBlended(camera, options.blendKernel, options.splat, session.progress());
+    drawFrames(options, grid, session, [&](const Camera& camera, std::optional<Sums>&) {
+      BlendedResult result = splatter.renderBlended(camera, options.blendKernel, options.splat, session.progress());
+      report(result.statistics, grid, file, session);
+      return std::move(result.image);
+    });
+    return;
+  }
+  SharedDrawing drawing(splatter, options.share, options.camera.imageSize, session);
+  drawFrames(options, grid, session, [&](const Camera& camera, std::optional<Sums>& sums) {
+    SplatResult result = drawing.render(camera, options.splat);
     report(result.statistics, grid, file, session);
-    return std::move(result.image);
-  }
-  const SplatResult result = splatter.render(camera, options.splat, session.progress());
-  report(result.statistics, grid, file, session);
-  session.statistics["passes"] = result.statistics.passes;
-  session.statistics["quantum"] = result.sums.quantum;
-  if (!options.sums.empty()) {
-    session.timed("write",
-                  [&] { writeExr(options.sums, result.sums.image, sumChannelNames(), session.imageMetadata()); });
-  }
-  return session.timed("resolve", [&] { return resolve(result.sums, splatFormula(options.formula)); });
+    session.statistics["passes"] = result.statistics.passes;
+    session.statistics["quantum"] = result.sums.quantum;
+    sums = std::move(result.sums);
+    if (!session.ranks().isRoot()) return Image();
+    return session.timed("resolve", [&] { return resolve(*sums, splatFormula(options.formula)); });
+  });
+  drawing.report();
 }
 
-Image drawFile(RenderOptions options, const CLI::App& command, Session& session) {
+void drawFile(RenderOptions options, const CLI::App& command, Session& session) {
   if (hasVolumeOptions(options.raw)) throw UsageError("options for raw volumes make no sense for an .fvx file");
   const AttenuationFile file(options.input);
   const TransferFunction transfer = transferFor(file, options.transfer);
   if (transfer.isLabels) keepLabelsApart(options, command);
   const ValueGrid grid = session.timed("read", [&] { return valueGrid(file); });
   if (options.formula == PictureFormula::raycast) return drawRays(grid, transfer, options, session);
-  return drawSplats(grid, &file, transfer, options, session);
+  drawSplats(grid, &file, transfer, options, session);
 }
 
 /// Whether a picture takes the 26 stored directions.
@@ -190,7 +248,7 @@ bool needsFile(const RenderOptions& options) {
          (!options.splat.lighting.lights.empty() && stored(options.splat.lightAttenuation));
 }
 
-Image drawVolume(RenderOptions options, const CLI::App& command, Session& session) {
+void drawVolume(RenderOptions options, const CLI::App& command, Session& session) {
   if (options.transfer.empty()) {
     openVolume(options.input, options.raw);  // what ails the file comes first
     throw UsageError("--transfer is required to draw a volume");
@@ -227,10 +285,14 @@ Outcome render(RenderOptions options, const CLI::App& command, Session& session)
   if (options.formula == PictureFormula::paper && command.get_option("--footprint")->count() == 0) {
     options.splat.footprint = Footprint::kernel;
   }
-  writePicture(
-      options.picture,
-      isAttenuationFile(options.input) ? drawFile(options, command, session) : drawVolume(options, command, session),
-      session);
+  if (session.ranks().rankCount() > 1 && !hasSums(options.formula)) {
+    throw UsageError("only sums are shared among processes: run --formula raycast and blended without the launcher");
+  }
+  if (isAttenuationFile(options.input)) {
+    drawFile(options, command, session);
+  } else {
+    drawVolume(options, command, session);
+  }
   return Outcome::done;
 }
 
@@ -298,12 +360,19 @@ Command addRender(CLI::App& program, CommonOptions& common) {
                         "order of splats; the bits are the same (default hilbert)", parseOrder);
   command->add_option("--sums", options->sums, "write the six sums of every pixel: R G B O DepthHigh DepthLow")
       ->type_name("FILE.exr");
+  addChoice<bool>(*command, "--colour-by", options->share.colourByRank, {{"value", false}, {"rank", true}},
+                  "the transfer function's colours, or one for every process: what it drew");
+  addParsed<int>(*command, "--frames", options->frames, "N",
+                 fmt::format("a turntable: N pictures, 1 to {}, of a full turn about y, named NAME_0000.png and so on",
+                             kMostFrames),
+                 [](std::string_view text) { return int(parseWhole(text, 1, kMostFrames)); });
   addBackgroundOption(*command, options->picture);
   addCameraOptions(*command, options->camera);
   addLightOptions(*command, options->light);
   addVolumeOptions(*command, options->raw);
+  addShareOptions(*command, options->share);
   addCommonOptions(*command, common);
-  return {command, [options, command](Session& session) { return render(*options, *command, session); }};
+  return {command, [options, command](Session& session) { return render(*options, *command, session); }, true};
 }
 
 }  // namespace freevoxel

@@ -31,18 +31,18 @@ std::string quoted(std::string_view argument) {
   return text + "'";
 }
 
-uint64_t peakMemoryBytes() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return uint64_t(usage.ru_maxrss) * 1024;
-}
-
 bool onTerminal() {
   const char* terminal = getenv("TERM");
   return isatty(STDERR_FILENO) != 0 && terminal != nullptr && std::string_view(terminal) != "dumb";
 }
 
 }  // namespace
+
+uint64_t peakMemoryBytes() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return uint64_t(usage.ru_maxrss) * 1024;
+}
 
 std::string programVersion() {
   return "freevoxel " FREEVOXEL_VERSION;
@@ -55,14 +55,19 @@ std::string typedCommand(int argc, const char* const* argv) {
   return command;
 }
 
-Session::Session(std::string command, const CommonOptions& options)
-    : command_(std::move(command)), options_(options), progress_(std::make_unique<Progress>()) {
-  if (options.threads) {
-    omp_set_num_threads(*options.threads);
-    // Mesa's software renderer has threads of its own. What the user set himself stays.
-    setenv("LP_NUM_THREADS", std::to_string(*options.threads).c_str(), 0);
+Session::Session(std::string command, const CommonOptions& options, const Ranks& ranks, bool shared)
+    : command_(std::move(command)), options_(options), ranks_(ranks), progress_(std::make_unique<Progress>()) {
+  std::optional<int> threads = options.threads;
+  if (!threads && shared && ranks.launched()) {
+    const int fair = ranks.fairThreadCount();
+    if (getenv("OMP_NUM_THREADS") == nullptr) threads = fair;
   }
-  if (!options.quiet && onTerminal()) progress_ = std::make_unique<ProgressBar>();
+  if (threads) {
+    omp_set_num_threads(*threads);
+    // Mesa's software renderer has threads of its own. What the user set himself stays.
+    setenv("LP_NUM_THREADS", std::to_string(*threads).c_str(), 0);
+  }
+  if (!options.quiet && ranks.isRoot() && onTerminal()) progress_ = std::make_unique<ProgressBar>();
 }
 
 ImageMetadata Session::imageMetadata() const {
@@ -79,7 +84,7 @@ void Session::tell(const std::string& text) const {
 }
 
 void Session::complain(const std::string& text) const {
-  fmt::print(stderr, "freevoxel: {}\n", text);
+  if (ranks_.isRoot()) fmt::print(stderr, "freevoxel: {}\n", text);
 }
 
 void Session::addSeconds(const std::string& stage, double seconds) {
@@ -87,7 +92,7 @@ void Session::addSeconds(const std::string& stage, double seconds) {
 }
 
 void Session::writeStatistics() {
-  if (options_.statisticsPath.empty()) return;
+  if (options_.statisticsPath.empty() || !ranks_.isRoot()) return;
   addSeconds("total", std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count());
   nlohmann::ordered_json all = {
       {"command", command_}, {"version", FREEVOXEL_VERSION}, {"seconds", seconds_}, {"threads", omp_get_max_threads()}};

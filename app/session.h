@@ -11,6 +11,7 @@
 #include "app/options.h"
 #include "base/image.h"
 #include "base/progress.h"
+#include "parallel/ranks.h"
 
 namespace freevoxel {
 
@@ -20,11 +21,17 @@ std::string programVersion();
 /// The arguments as they would be typed into a shell, the program's path shortened to its name.
 std::string typedCommand(int argc, const char* const* argv);
 
+/// Largest resident memory of this process so far.
+uint64_t peakMemoryBytes();
+
 class Session {
  public:
-  Session(std::string command, const CommonOptions& options);
+  /// Collective if `shared`: whether all ranks run this command. `options` and `ranks` must outlive the session.
+  Session(std::string command, const CommonOptions& options, const Ranks& ranks, bool shared);
 
   const std::string& command() const { return command_; }
+  /// The processes that run this command. Only rank 0 speaks and writes.
+  const Ranks& ranks() const { return ranks_; }
   Progress& progress() { return *progress_; }
   ImageMetadata imageMetadata() const;
 
@@ -46,7 +53,7 @@ class Session {
   /// Entries of the statistics file.
   nlohmann::ordered_json statistics = nlohmann::ordered_json::object();
 
-  /// Writes the statistics file if one was asked for. Throws MachineError.
+  /// Writes the statistics file if one was asked for, on rank 0. Throws MachineError.
   void writeStatistics();
 
  private:
@@ -61,6 +68,7 @@ class Session {
 
   std::string command_;
   const CommonOptions& options_;
+  const Ranks& ranks_;
   std::unique_ptr<Progress> progress_;
   std::vector<std::string> warnings_;
   nlohmann::ordered_json seconds_ = nlohmann::ordered_json::object();

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <glm/gtc/matrix_transform.hpp>
 #include <memory>
 #include <numbers>
 
@@ -94,15 +93,6 @@ std::unique_ptr<gl::Context> chooseContext(Backend backend) {
   // A GL that runs on the CPU is slower there than our own code.
   if (backend == Backend::automatic && context && context->isSoftware()) context.reset();
   return context;
-}
-
-/// The camera turned about an axis through its target.
-Camera turned(const Camera& camera, double angle, glm::dvec3 axis) {
-  const glm::dmat3 rotation(glm::rotate(glm::dmat4(1.0), angle, axis));
-  Camera result = camera;
-  result.eye = camera.target + rotation * (camera.eye - camera.target);
-  result.up = rotation * camera.up;
-  return result;
 }
 
 /// The paper's measurement: a full turn about y, then one about x.

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <glm/glm.hpp>
+#include <glm/gtc/matrix_transform.hpp>
 #include <numbers>
 
 #include "base/error.h"
@@ -39,6 +40,14 @@ void checkCamera(const Camera& camera) {
     throw InputError(
         fmt::format("camera: image size {}x{} is not within 1..32768", camera.imageSize.x, camera.imageSize.y));
   }
+}
+
+Camera turned(const Camera& camera, double angle, glm::dvec3 axis) {
+  const glm::dmat3 rotation(glm::rotate(glm::dmat4(1.0), angle, axis));
+  Camera result = camera;
+  result.eye = camera.target + rotation * (camera.eye - camera.target);
+  result.up = rotation * camera.up;
+  return result;
 }
 
 ViewFrame viewFrame(const Camera& camera) {

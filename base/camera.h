@@ -25,6 +25,9 @@ struct Camera {
 /// Throws InputError unless the camera's invariant holds.
 void checkCamera(const Camera& camera);
 
+/// The camera turned about an axis of world space through its target; `angle` in radians.
+Camera turned(const Camera& camera, double angle, glm::dvec3 axis);
+
 /// View space axes of a camera as rows applied to world vectors: view = rotation * (world - eye).
 struct ViewFrame {
   glm::dmat3 viewFromWorld;  ///< rotation only

@@ -150,6 +150,7 @@ void AttenuationFile::readSectionTable(const FileHeader& header) {
     throw mismatch(path_, offsetof(FileHeader, hash), "checksum of header and section table",
                    fmt::format("{:016x}", header.hash), fmt::format("{:016x}", hash));
   }
+  hash_ = header.hash;
   for (size_t i = 0; i < sections_.size(); ++i) {
     const SectionEntry& entry = sections_[i];
     const uint64_t at = sizeof(FileHeader) + i * sizeof(SectionEntry);

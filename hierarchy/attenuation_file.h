@@ -63,9 +63,10 @@ class AttenuationFile {
   uint64_t visibleVoxels() const { return metadata_.visibleVoxels; }        ///< opacity > 0
   uint64_t nonFinite() const { return metadata_.nonFinite; }                ///< voxels that were NaN or infinite
   double largestValueError() const { return metadata_.largestValueError; }  ///< by coding values, data units
-  uint64_t codeBytes() const;         ///< that values take in the file, the directories left out
-  uint64_t attenuationBytes() const;  ///< that attenuation takes, as above
-  std::string command() const;        ///< that made the file; empty if not recorded
+  uint64_t codeBytes() const;                  ///< that values take in the file, the directories left out
+  uint64_t attenuationBytes() const;           ///< that attenuation takes, as above
+  uint64_t identity() const { return hash_; }  ///< a hash of the whole file, as its header has it
+  std::string command() const;                 ///< that made the file; empty if not recorded
 
   size_t brickCount() const { return bricks_.size(); }  ///< stored bricks, sorted along the Hilbert curve
   glm::ivec3 brickOrigin(size_t i) const;               ///< its first voxel
@@ -122,6 +123,7 @@ class AttenuationFile {
   Placement placement_;
   ValueCoding coding_;
   TransferFunction transfer_;
+  uint64_t hash_ = 0;
   int curveOrder_ = 0;  ///< of the curve through the bricks
   // Copies: what has been checked must not change with the file.
   std::vector<BrickEntry> bricks_;

@@ -46,6 +46,9 @@ Every command takes `--stats FILE.json` and writes what it did; of these keys th
 | `bufferBytes`, `bytesPerStoredVoxel` | of `trace`: of all buffers that rays read without lamps; divided by `storedVoxels` |
 | `builds` | of `trace`: how often voxels were stored, 2 if an edit needed others |
 | `frameSeconds`, `framesPerSecond`, `raysPerSecond` | of `trace --turn`: of its views |
+| `frameSeconds` | of `render --frames`: of every picture, writing left out |
+| `partition`, `balance`, `balancePieces` | of several ranks: how blocks were dealt; mean over largest splats, and pieces of rays, of a rank |
+| `ranks` | of several ranks, one entry each: `rank`, `host`, `seconds` (`attenuation`, `light`, `setup`, `draw`, `composite`), `blocks`, `splats`, `fragments`, `pieces`, `sentBytes` (by the composite), `peakMemoryBytes`, all frames together; what stands outside of it are sums (`blocks`, `splats`, `fragments`) or rank 0's |
 | `identical`, `psnr`, `ssim`, `rms`, `maxError`, `differingBytes`, `coveredPixels` | of `compare` |
 | `peakMemoryBytes` | largest resident memory of the process |
 | `warnings` | what the user was warned of |

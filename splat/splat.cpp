@@ -28,9 +28,6 @@ double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Edge of a block, voxels. Attenuation comes in where rays enter a block, so larger blocks are more accurate; smaller
-/// ones are skipped, culled and shared among processes more finely (docs/fidelity.md has the figures).
-constexpr int kBlockEdge = 32;
 /// Kernel splats held at a time: 48 bytes each.
 constexpr size_t kSplatsPerBatch = size_t(1) << 20;
 constexpr size_t kBlocksPerBatch = 64;
@@ -120,6 +117,17 @@ struct Splatter::State {
   std::unique_ptr<gl::Context> context;  // null: cpu
   LightGrid light;
   std::optional<CoarseVolume> coarse;  ///< made when first needed
+  int blockEdge;
+
+  /// What of a frame does not depend on the quantum, light apart.
+  struct Frame {
+    Camera camera;
+    SplatOptions options;
+    VolumeView view;
+    AttenuationGrid attenuation;
+    SplatStatistics statistics;
+  };
+  std::optional<Frame> frame;
 
   /// The source that `automatic` stands for. Throws InputError if there is no file to take it from.
   AttenuationSource chosen(AttenuationSource source, const Towards& target, bool lamp) const;
@@ -127,17 +135,20 @@ struct Splatter::State {
   void lightVoxels(const Camera& camera, const SplatOptions& options, SplatStatistics& statistics);
   /// Visible blocks, without hidden ones if asked for, in the order asked for.
   std::vector<VisibleBlock> blocksToDraw(const AttenuationGrid& attenuation, const SplatOptions& options,
-                                         SplatStatistics& statistics) const;
-  /// Draws all blocks once and gives the sums in whole quanta.
+                                         std::span<const uint8_t> share, SplatStatistics& statistics) const;
+  /// Draws the share's blocks once and gives the sums in whole quanta.
   Image drawCells(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
-                  const SplatOptions& options, float quantum, SplatStatistics& statistics, Progress& progress);
+                  const SplatOptions& options, float quantum, std::span<const uint8_t> share,
+                  SplatStatistics& statistics, Progress& progress);
   Image drawKernels(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
-                    const SplatOptions& options, float quantum, SplatStatistics& statistics, Progress& progress);
+                    const SplatOptions& options, float quantum, std::span<const uint8_t> share,
+                    SplatStatistics& statistics, Progress& progress);
 };
 
 Splatter::Splatter(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer,
-                   Backend backend)
-    : state_(std::make_unique<State>(State{grid, file, transfer, {}, {}, {}, {}, nullptr, {}, {}})) {
+                   Backend backend, int blockEdge)
+    : state_(std::make_unique<State>(State{grid, file, transfer, {}, {}, {}, {}, nullptr, {}, {}, blockEdge, {}})) {
+  check(blockEdge >= 1 && blockEdge <= 61, "a block's edge is 1 to 61 voxels");
   if (file != nullptr && !sameOpacity(transfer, file->transfer())) {
     throw InputError(fmt::format(
         "{}: made with other opacities than the transfer function given; run precompute again with it", file->path()));
@@ -153,7 +164,7 @@ Splatter::Splatter(const ValueGrid& grid, const AttenuationFile* file, const Tra
   }
   state_->classified = classifyCodes(grid.coding, transfer);
   state_->table = classificationTable(transfer, grid.coding);
-  state_->blocks = findVisibleBlocks(grid, transfer, kBlockEdge);
+  state_->blocks = findVisibleBlocks(grid, transfer, blockEdge);
   state_->cubes = findVisibleCubes(grid, transfer);
 }
 
@@ -205,33 +216,33 @@ void Splatter::State::lightVoxels(const Camera& camera, const SplatOptions& opti
 }
 
 Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
-                                 const SplatOptions& options, float quantum, SplatStatistics& statistics,
-                                 Progress& progress) {
+                                 const SplatOptions& options, float quantum, std::span<const uint8_t> share,
+                                 SplatStatistics& statistics, Progress& progress) {
   const Clock::time_point setupStart = Clock::now();
   const std::unique_ptr<CellCanvas> canvas =
       context ? makeGlCellCanvas(*context, camera.imageSize) : makeCpuCellCanvas(camera.imageSize);
   const std::vector<PixelRay> rays = pixelRays(grid.placement, grid.dims, camera);
-  CellFrame frame;
-  frame.grid = &grid;
-  frame.attenuation = &attenuation;
-  frame.light = &light;
-  frame.table = &table;
-  frame.view = &view;
-  frame.rays = &rays;
-  frame.edge = kBlockEdge;
-  frame.inverseQuantum = 1.0f / quantum;
+  CellFrame cells;
+  cells.grid = &grid;
+  cells.attenuation = &attenuation;
+  cells.light = &light;
+  cells.table = &table;
+  cells.view = &view;
+  cells.rays = &rays;
+  cells.edge = blockEdge;
+  cells.inverseQuantum = 1.0f / quantum;
   // Stored attenuation, corrected or not, is too rough to end a ray.
   const bool endRays =
       options.cull == Cull::hidden && statistics.attenuation == attenuationSourceName(AttenuationSource::swept);
-  frame.hiddenBelow = endRays ? kHiddenBelow : 0.0f;
-  const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, statistics);
+  cells.hiddenBelow = endRays ? kHiddenBelow : 0.0f;
+  const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, share, statistics);
   statistics.setupSeconds += secondsSince(setupStart);
   const Clock::time_point drawStart = Clock::now();
   CellCounts counts;
   canvas->clear();
   for (size_t first = 0; first < ordered.size(); first += kBlocksPerBatch) {
     const size_t count = std::min(kBlocksPerBatch, ordered.size() - first);
-    canvas->draw(frame, std::span(ordered).subspan(first, count), counts);
+    canvas->draw(cells, std::span(ordered).subspan(first, count), counts);
     progress.advance(count);
   }
   Image sums = canvas->wholeQuanta();
@@ -244,27 +255,37 @@ Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, c
 }
 
 std::vector<VisibleBlock> Splatter::State::blocksToDraw(const AttenuationGrid& attenuation, const SplatOptions& options,
+                                                        std::span<const uint8_t> share,
                                                         SplatStatistics& statistics) const {
   std::vector<VisibleBlock> drawn = blocks;
-  if (options.cull == Cull::hidden) {
-    std::vector<uint8_t> hidden(blocks.size());
-#pragma omp parallel for schedule(dynamic, 1)
-    for (int64_t i = 0; i < int64_t(blocks.size()); ++i)
-      hidden[size_t(i)] =
-          isHidden(blocks[size_t(i)], grid.dims, attenuation, uint16_t(kHiddenBelow * AttenuationGrid::kUnit)) ? 1 : 0;
+  if (!share.empty()) {
+    checkEqual(share.size(), blocks.size(), "length of a share");
     drawn.clear();
     for (size_t i = 0; i < blocks.size(); ++i) {
-      if (hidden[i] == 0) drawn.push_back(blocks[i]);
+      if (share[i] != 0) drawn.push_back(blocks[i]);
     }
   }
-  statistics.hiddenBlocks = blocks.size() - drawn.size();
+  const size_t shared = drawn.size();
+  if (options.cull == Cull::hidden) {
+    std::vector<uint8_t> hidden(shared);
+#pragma omp parallel for schedule(dynamic, 1)
+    for (int64_t i = 0; i < int64_t(shared); ++i)
+      hidden[size_t(i)] =
+          isHidden(drawn[size_t(i)], grid.dims, attenuation, uint16_t(kHiddenBelow * AttenuationGrid::kUnit)) ? 1 : 0;
+    size_t kept = 0;
+    for (size_t i = 0; i < shared; ++i) {
+      if (hidden[i] == 0) drawn[kept++] = drawn[i];
+    }
+    drawn.resize(kept);
+  }
+  statistics.hiddenBlocks = shared - drawn.size();
   putInOrder(drawn, options.order, 0);
   return drawn;
 }
 
 Image Splatter::State::drawKernels(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
-                                   const SplatOptions& options, float quantum, SplatStatistics& statistics,
-                                   Progress& progress) {
+                                   const SplatOptions& options, float quantum, std::span<const uint8_t> share,
+                                   SplatStatistics& statistics, Progress& progress) {
   const std::unique_ptr<KernelCanvas> canvas =
       context ? makeGlKernelCanvas(*context, camera.imageSize) : makeCpuKernelCanvas(camera.imageSize);
   const KernelSetup setup(view, classified,
@@ -272,7 +293,7 @@ Image Splatter::State::drawKernels(const Camera& camera, const VolumeView& view,
                           quantum, options.cull == Cull::hidden ? kHiddenBelow : 0.0f);
   statistics.blocks = statistics.culledBlocks = statistics.splats = statistics.culledSplats = statistics.fragments = 0;
   statistics.hiddenSplats = 0;
-  const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, statistics);
+  const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, share, statistics);
   std::vector<KernelSplat> batch;
   const auto flush = [&] {
     const Clock::time_point start = Clock::now();
@@ -292,9 +313,9 @@ Image Splatter::State::drawKernels(const Camera& camera, const VolumeView& view,
 #pragma omp parallel for schedule(dynamic, 1)
     for (int64_t i = 0; i < int64_t(count); ++i) {
       const VisibleBlock& block = ordered[first + size_t(i)];
-      drawn[i] = setup.mayTouchImage(block.origin, kBlockEdge);
+      drawn[i] = setup.mayTouchImage(block.origin, blockEdge);
       if (!drawn[i]) continue;
-      setup.append(grid, attenuation, light, block.origin, kBlockEdge, splats[i], counts[i]);
+      setup.append(grid, attenuation, light, block.origin, blockEdge, splats[i], counts[i]);
       putInOrder(splats[i], options.order, 1 + linearIndex(block.origin, grid.dims));
     }
     for (size_t i = 0; i < count; ++i) {
@@ -312,10 +333,14 @@ Image Splatter::State::drawKernels(const Camera& camera, const VolumeView& view,
   return canvas->wholeQuanta();
 }
 
-SplatResult Splatter::render(const Camera& camera, const SplatOptions& options, Progress& progress) {
+std::span<const VisibleBlock> Splatter::blocks() const {
+  return state_->blocks;
+}
+
+void Splatter::prepare(const Camera& camera, const SplatOptions& options) {
   State& state = *state_;
-  SplatResult result;
-  SplatStatistics& statistics = result.statistics;
+  SplatStatistics statistics;
+  statistics.passes = 0;
   statistics.backend = state.context ? "gl" : "cpu";
   if (state.context) statistics.glRenderer = state.context->renderer();
   const bool paper = options.formula == Formula::paper;
@@ -323,7 +348,6 @@ SplatResult Splatter::render(const Camera& camera, const SplatOptions& options, 
     throw InputError("formula paper is defined for the kernel footprint; add --footprint kernel");
   }
 
-  const VolumeView view = volumeView(state.grid.placement, camera);
   const Clock::time_point attenuationStart = Clock::now();
   const Towards eye = towardsEye(state.grid, camera);
   // The paper looks up the nearest direction, wherever the eye is.
@@ -334,35 +358,50 @@ SplatResult Splatter::render(const Camera& camera, const SplatOptions& options, 
   }
   source = state.chosen(source, eye, false);
   statistics.attenuation = attenuationSourceName(source);
-  const AttenuationGrid attenuation =
+  state.frame.reset();
+  AttenuationGrid attenuation =
       paper ? storedAttenuation(*state.file, eye, StoredLookup::nearest) : state.attenuationTowards(eye, source);
   statistics.attenuationSeconds = secondsSince(attenuationStart);
   const Clock::time_point lightStart = Clock::now();
   state.lightVoxels(camera, options, statistics);
   statistics.lightSeconds = secondsSince(lightStart);
+  state.frame.emplace(State::Frame{camera, options, volumeView(state.grid.placement, camera), std::move(attenuation),
+                                   std::move(statistics)});
+}
 
+Sums Splatter::draw(float quantum, std::span<const uint8_t> share, Progress& progress) {
+  State& state = *state_;
+  check(state.frame.has_value(), "a frame is prepared before it is drawn");
+  auto& [camera, options, view, attenuation, statistics] = *state.frame;
+  ++statistics.passes;
+  Sums sums;
+  progress.begin("splatting", state.blocks.size(), "blocks");
+  sums.image = options.footprint == Footprint::cell
+                   ? state.drawCells(camera, view, attenuation, options, quantum, share, statistics, progress)
+                   : state.drawKernels(camera, view, attenuation, options, quantum, share, statistics, progress);
+  progress.end();
+  sums.quantum = quantum;
+  sums.lightScale = state.light.scale;
+  // Powers of two: exact.
+  const float units[kSumChannels] = {quantum, quantum, quantum, quantum, shared::kDepthHighUnit, shared::kDepthLowUnit};
+  std::vector<float>& values = sums.image.pixels;
+  for (size_t i = 0; i < values.size(); ++i)
+    values[i] *= units[i % kSumChannels];
+  return sums;
+}
+
+const SplatStatistics& Splatter::statistics() const {
+  check(state_->frame.has_value(), "a frame is prepared before its statistics are read");
+  return state_->frame->statistics;
+}
+
+SplatResult Splatter::render(const Camera& camera, const SplatOptions& options, Progress& progress) {
+  prepare(camera, options);
   float quantum = options.firstQuantum;
-  for (;; quantum *= 4.0f, ++statistics.passes) {
-    progress.begin("splatting", state.blocks.size(), "blocks");
-    result.sums.image = options.footprint == Footprint::cell
-                            ? state.drawCells(camera, view, attenuation, options, quantum, statistics, progress)
-                            : state.drawKernels(camera, view, attenuation, options, quantum, statistics, progress);
-    progress.end();
-    result.sums.quantum = quantum;
-    result.sums.lightScale = state.light.scale;
-    // Powers of two: exact.
-    const float units[kSumChannels] = {
-        quantum, quantum, quantum, quantum, shared::kDepthHighUnit, shared::kDepthLowUnit};
-    std::vector<float>& values = result.sums.image.pixels;
-    for (size_t i = 0; i < values.size(); ++i)
-      values[i] *= units[i % kSumChannels];
-    if (sumsAreExact(result.sums)) return result;
-    if (quantum > 1.0f) {
-      // Light can be rounded more coarsely, but optical depth has fixed units.
-      throw InputError(
-          "optical depth along a pixel is beyond 2^18, too opaque to be summed exactly; lower the opacities or raise "
-          "referenceLength");
-    }
+  for (;;) {
+    Sums sums = draw(quantum, {}, progress);
+    if (sumsAreExact(sums)) return {std::move(sums), statistics()};
+    quantum = nextQuantum(quantum);
   }
 }
 
@@ -383,12 +422,12 @@ BlendedResult Splatter::renderBlended(const Camera& camera, BlendKernel kernel, 
   std::vector<BlendSplat> splats;
   KernelSetup::Counts counts;
   for (const VisibleBlock& block : state.blocks) {
-    if (!setup.mayTouchImage(block.origin, kBlockEdge)) {
+    if (!setup.mayTouchImage(block.origin, state.blockEdge)) {
       ++statistics.culledBlocks;
       continue;
     }
     ++statistics.blocks;
-    setup.appendWithDistance(state.grid, state.light, block.origin, kBlockEdge, splats, counts);
+    setup.appendWithDistance(state.grid, state.light, block.origin, state.blockEdge, splats, counts);
   }
   statistics.splats = splats.size();
   statistics.culledSplats = counts.culledSplats;

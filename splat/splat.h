@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -13,6 +14,7 @@
 #include "hierarchy/value_grid.h"
 #include "splat/blend_kernels.h"
 #include "splat/sums.h"
+#include "splat/visible_blocks.h"
 #include "volume/transfer_function.h"
 
 namespace freevoxel {
@@ -85,6 +87,11 @@ struct BlendedResult {
   SplatStatistics statistics;
 };
 
+/// Edge of a block, voxels. Attenuation comes in where rays enter a block, so larger blocks are more accurate; smaller
+/// ones are skipped, culled and shared among processes more finely (docs/fidelity.md has the figures). Other edges make
+/// another picture.
+inline constexpr int kBlockEdge = 32;
+
 /// Names on the command line and in statistics.
 std::string_view attenuationSourceName(AttenuationSource source);
 
@@ -93,14 +100,28 @@ class Splatter {
  public:
   /// `grid` and `file` must outlive the splatter; `file` may be null (then attenuation is always swept). The opacities
   /// of `transfer` must be those that the file was made with (opacityHash).
-  /// Throws InputError (transfer function), MachineError (no GL where it was asked for).
-  Splatter(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer, Backend backend);
+  /// `blockEdge`: 1 to 61. Throws InputError (transfer function), MachineError (no GL where it was asked for).
+  Splatter(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer, Backend backend,
+           int blockEdge = kBlockEdge);
   ~Splatter();
   Splatter(Splatter&& other) noexcept;
   Splatter& operator=(Splatter&&) = delete;
 
+  /// The blocks in which something is visible, along the Hilbert curve.
+  std::span<const VisibleBlock> blocks() const;
+
   /// Same bits for any order, thread count and backend. Throws InputError or MachineError.
   SplatResult render(const Camera& camera, const SplatOptions& options, Progress& progress);
+
+  /// The same in two steps, for those who add other processes' sums before they ask whether they are exact: makes a
+  /// frame's attenuation and light, once, and draws it, at any quantum. The frame lasts until the next prepare() or
+  /// render().
+  void prepare(const Camera& camera, const SplatOptions& options);
+  /// Sums of a share of the blocks, which may not be exact. `share`: per block of blocks(), 0 = left to somebody else;
+  /// empty = all are drawn. The sums of shares add up to those of the whole, bit for bit.
+  Sums draw(float quantum, std::span<const uint8_t> share, Progress& progress);
+  /// Of the frame as it was drawn last.
+  const SplatStatistics& statistics() const;
 
   /// The leaky baseline: kernels, sorted by their distance from the eye and laid over each other from back to front.
   /// On the CPU only. `options` as for `render`; formula, footprint and source of attenuation do not matter.

@@ -20,16 +20,33 @@ const std::vector<std::string>& sumChannelNames() {
   return names;
 }
 
+std::array<float, kSumChannels> exactLimits(float quantum) {
+  const float light = shared::kExactLimit * quantum;
+  return {light,
+          light,
+          light,
+          light,
+          shared::kExactLimit * shared::kDepthHighUnit,
+          shared::kExactLimit * shared::kDepthLowUnit};
+}
+
 bool sumsAreExact(const Sums& sums) {
-  const float limits[kSumChannels] = {
-      shared::kExactLimit * sums.quantum,           shared::kExactLimit * sums.quantum,
-      shared::kExactLimit * sums.quantum,           shared::kExactLimit * sums.quantum,
-      shared::kExactLimit * shared::kDepthHighUnit, shared::kExactLimit * shared::kDepthLowUnit};
+  const std::array<float, kSumChannels> limits = exactLimits(sums.quantum);
   const std::vector<float>& values = sums.image.pixels;
   for (size_t i = 0; i < values.size(); ++i) {
     if (!(values[i] < limits[i % kSumChannels])) return false;
   }
   return true;
+}
+
+float nextQuantum(float quantum) {
+  // Light can be rounded more coarsely, but optical depth has fixed units.
+  if (quantum > 1.0f) {
+    throw InputError(
+        "optical depth along a pixel is beyond 2^18, too opaque to be summed exactly; lower the opacities or raise "
+        "referenceLength");
+  }
+  return 4.0f * quantum;
 }
 
 Image resolve(const Sums& sums, Formula formula) {

@@ -1,6 +1,7 @@
 // The six sums of a pixel and what they become (DESIGN sections 3 and 4).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <string>
@@ -29,9 +30,15 @@ struct Sums {
   float lightScale = 1.0f;  ///< S_rgb times this is radiance (colours are divided by it before they are summed)
 };
 
+/// What each channel of sums has to stay below: 2^24 quanta.
+std::array<float, kSumChannels> exactLimits(float quantum);
+
 /// Whether no sum reached 2^24 quanta. Contributions are not negative, so this proves every partial sum exact, in any
 /// order and any reduction tree.
 bool sumsAreExact(const Sums& sums);
+
+/// The quantum to draw with after sums of `quantum` have not proved exact. Throws InputError if no quantum can help.
+float nextQuantum(float quantum);
 
 /// Premultiplied linear RGBA. alpha = 1 - exp(-S_d), except that for `paper` and `direct` alpha = min(S_o, 1).
 Image resolve(const Sums& sums, Formula formula);

@@ -13,10 +13,11 @@ namespace {
 
 struct CellRange {
   glm::ivec3 low{INT32_MAX}, high{INT32_MIN};
+  uint32_t count = 0;
   bool empty() const { return low.x >= high.x; }
 };
 
-/// Bounds of the visible cells whose lower corner lies in the block.
+/// Bounds and number of the visible cells whose lower corner lies in the block.
 CellRange visibleCells(const ValueGrid& grid, const CodeVisibility& visibility, glm::ivec3 origin, int edge) {
   CellRange range;
   const glm::ivec3 last = glm::min(origin + edge, grid.dims);
@@ -35,6 +36,7 @@ CellRange visibleCells(const ValueGrid& grid, const CodeVisibility& visibility, 
         const int x1 = std::min(x + 1, grid.dims.x - 1);
         const uint16_t lowNext = low(x1), highNext = high(x1);
         if (visibility.between(std::min(lowHere, lowNext), std::max(highHere, highNext))) {
+          ++range.count;
           range.low = glm::min(range.low, glm::ivec3(x, y, z));
           range.high = glm::max(range.high, glm::ivec3(x, y, z) + 1);
         }
@@ -80,7 +82,8 @@ std::vector<VisibleBlock> findVisibleBlocks(const ValueGrid& grid, const Transfe
           range.high = glm::max(range.high, high);
         }
         if (!range.empty())
-          found.emplace_back(hilbertIndex({x, y, z}, order), VisibleBlock{origin, range.low, range.high});
+          found.emplace_back(hilbertIndex({x, y, z}, order),
+                             VisibleBlock{origin, range.low, range.high, own[linearIndex({x, y, z}, blocks)].count});
       }
     }
   }

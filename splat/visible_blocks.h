@@ -1,6 +1,7 @@
 // Which blocks have something to draw, and where in them.
 #pragma once
 
+#include <cstdint>
 #include <glm/vec3.hpp>
 #include <vector>
 
@@ -15,6 +16,7 @@ struct VisibleBlock {
   /// Cells, by their lower corner, outside which no piece of a ray that the block owns can see anything:
   /// origin <= low < high <= origin + edge.
   glm::ivec3 low{0}, high{0};
+  uint32_t visibleCells = 0;  ///< whose lower corner lies in the block
 };
 
 /// In the order of the Hilbert curve.

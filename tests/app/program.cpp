@@ -22,6 +22,27 @@ ProcessResult freevoxel(const std::string& folder, const std::vector<std::string
   return runProcess(all, options);
 }
 
+ProcessResult mpirun(const std::string& folder, int rankCount, const std::vector<std::string>& arguments,
+                     int otherCount, const std::vector<std::string>& otherArguments) {
+  std::vector<std::string> all = {FREEVOXEL_MPIRUN};
+  const auto append = [&](int count, const std::vector<std::string>& more) {
+    all.insert(all.end(), {"-n", std::to_string(count), programPath()});
+    all.insert(all.end(), more.begin(), more.end());
+  };
+  append(rankCount, arguments);
+  if (otherCount > 0) {
+    all.emplace_back(":");
+    append(otherCount, otherArguments);
+  }
+  ProcessOptions options;
+  options.folder = folder;
+  // For containers: root, and more ranks than cores.
+  options.environment = {{"OMPI_ALLOW_RUN_AS_ROOT", "1"},
+                         {"OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1"},
+                         {"OMPI_MCA_rmaps_base_oversubscribe", "1"}};
+  return runProcess(all, options);
+}
+
 ProcessResult freevoxelDone(const std::string& folder, const std::vector<std::string>& arguments) {
   ProcessResult result = freevoxel(folder, arguments);
   EXPECT_EQ(result.status, 0) << ::testing::PrintToString(arguments) << "\n" << result.talk;

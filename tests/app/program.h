@@ -17,6 +17,10 @@ std::string programPath();
 /// Runs `freevoxel ARGUMENTS...` in `folder`.
 ProcessResult freevoxel(const std::string& folder, const std::vector<std::string>& arguments);
 
+/// The same by `rankCount` processes under mpirun; `otherCount` more, with the highest ranks, get other arguments.
+ProcessResult mpirun(const std::string& folder, int rankCount, const std::vector<std::string>& arguments,
+                     int otherCount = 0, const std::vector<std::string>& otherArguments = {});
+
 /// As above; fails the test unless the exit status is 0.
 ProcessResult freevoxelDone(const std::string& folder, const std::vector<std::string>& arguments);
 

@@ -1,0 +1,176 @@
+#include "app/shared_drawing.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <array>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+#include "base/error.h"
+
+namespace freevoxel {
+
+namespace {
+
+double secondsSince(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Sums of white matter become those of matter in one colour: still whole quanta, still below S_o.
+void tint(Sums& sums, glm::vec3 linear) {
+  const float inverseQuantum = 1.0f / sums.quantum;
+  for (size_t i = 0; i < sums.image.pixels.size(); i += kSumChannels) {
+    for (int c = 0; c < 3; ++c) {
+      float& value = sums.image.pixels[i + size_t(c)];
+      value = std::nearbyint(value * inverseQuantum * linear[c]) * sums.quantum;
+    }
+  }
+}
+
+std::string hostName() {
+  std::array<char, 256> name{};
+  gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+}  // namespace
+
+void addShareOptions(CLI::App& command, ShareOptions& options) {
+  const std::string group = "Several processes (mpirun -n N freevoxel ...; the bits are the same for any number)";
+  addParsed<Partition>(
+      command, "--partition", options.partition, "round-robin|hilbert|slab|random:SEED|file:F",
+      "which rank draws which block: in turn, those with most to draw first; runs of the Hilbert "
+      "curve; slabs across z; at random; or as a text file says, a rank for every block (default "
+      "round-robin)",
+      [](std::string_view text) {
+        Partition partition;
+        if (!parsePartition(text, partition)) {
+          throw UsageError(fmt::format("expected round-robin, hilbert, slab, random:SEED or file:F, found '{}'", text));
+        }
+        return partition;
+      })
+      ->group(group);
+  addChoice<CompositeMethod>(command, "--composite", options.composite,
+                             {{"tiles", CompositeMethod::tiles}, {"reduce", CompositeMethod::reduce}},
+                             "how pictures of several ranks are added: bands of the image by rank and only tiles that "
+                             "are covered, or one MPI_Reduce of whole images")
+      ->group(group);
+}
+
+glm::dvec3 rankColour(int rank) {
+  // Hues a golden angle apart, three turns of saturation and value.
+  const double hue = 6.0 * std::fmod(0.61803398874989485 * rank + 0.03, 1.0);
+  const double saturation = rank % 2 == 0 ? 0.85 : 0.6;
+  glm::dvec3 colour;
+  for (int c = 0; c < 3; ++c) {
+    const double k = std::fmod(c == 0 ? hue + 5.0 : c == 1 ? hue + 3.0 : hue + 1.0, 6.0);
+    colour[c] = 1.0 - saturation * std::max(0.0, std::min({k, 4.0 - k, 1.0}));
+  }
+  return colour;
+}
+
+std::vector<SharedBlock> sharedBlocks(std::span<const VisibleBlock> blocks) {
+  std::vector<SharedBlock> shared;
+  shared.reserve(blocks.size());
+  for (const VisibleBlock& block : blocks)
+    shared.push_back({0, block.origin.z, block.visibleCells});
+  return shared;
+}
+
+void expectSameOnAllRanks(const Ranks& ranks, uint64_t identity, const std::string& what) {
+  if (ranks.rankCount() == 1) return;
+  ranks.agree();
+  const std::vector<std::string> all = ranks.gatherEverywhere(fmt::format("{:016x}", identity));
+  for (size_t rank = 1; rank < all.size(); ++rank) {
+    if (all[rank] == all[0]) continue;
+    throw InputError(
+        fmt::format("{}: rank {} sees another file than rank 0: expected hash {}, found {}; put it where all ranks see "
+                    "the same, and wait until it is written",
+                    what, rank, all[0], all[rank]));
+  }
+}
+
+SharedDrawing::SharedDrawing(Splatter& splatter, const ShareOptions& options, glm::ivec2 imageSize, Session& session)
+    : splatter_(splatter), options_(options), session_(session), compositor_(session.ranks(), imageSize, kSumChannels) {
+  const Ranks& ranks = session.ranks();
+  if (ranks.rankCount() == 1) return;
+  share_ = shareOf(dealBlocks(sharedBlocks(splatter.blocks()), options.partition, ranks.rankCount()), ranks.rank());
+}
+
+SplatResult SharedDrawing::render(const Camera& camera, const SplatOptions& options) {
+  const Ranks& ranks = session_.ranks();
+  splatter_.prepare(camera, options);
+  const std::array<float, 3> colour = [&] {
+    std::array<float, 3> linear{};
+    for (int c = 0; c < 3; ++c)
+      linear[size_t(c)] = linearFromSrgb(float(rankColour(ranks.rank())[c]));
+    return linear;
+  }();
+  for (float quantum = options.firstQuantum;; quantum = nextQuantum(quantum)) {
+    Sums sums = splatter_.draw(quantum, share_, session_.progress());
+    if (options_.colourByRank) tint(sums, {colour[0], colour[1], colour[2]});
+    ranks.agree();
+    const auto start = std::chrono::steady_clock::now();
+    const std::array<float, kSumChannels> limits = exactLimits(quantum);
+    const bool exact = options_.composite == CompositeMethod::tiles ? compositor_.add(sums.image, limits)
+                                                                    : addByReduce(ranks, sums.image, limits);
+    if (options_.composite == CompositeMethod::reduce) reducedBytes_ += sums.image.pixels.size() * sizeof(float);
+    compositeSeconds_ += secondsSince(start);
+    if (!exact) continue;
+    const SplatStatistics& done = splatter_.statistics();
+    total_.blocks += done.blocks;
+    total_.splats += done.splats;
+    total_.fragments += done.fragments;
+    total_.pieces += done.pieces;
+    total_.attenuationSeconds += done.attenuationSeconds;
+    total_.lightSeconds += done.lightSeconds;
+    total_.setupSeconds += done.setupSeconds;
+    total_.drawSeconds += done.drawSeconds;
+    return {std::move(sums), done};
+  }
+}
+
+void SharedDrawing::report() {
+  const Ranks& ranks = session_.ranks();
+  if (ranks.rankCount() == 1) return;
+  session_.addSeconds("composite", compositeSeconds_);
+  const bool tiles = options_.composite == CompositeMethod::tiles;
+  const nlohmann::ordered_json mine = {{"rank", ranks.rank()},
+                                       {"host", hostName()},
+                                       {"seconds",
+                                        {{"attenuation", total_.attenuationSeconds},
+                                         {"light", total_.lightSeconds},
+                                         {"setup", total_.setupSeconds},
+                                         {"draw", total_.drawSeconds},
+                                         {"composite", compositeSeconds_}}},
+                                       {"blocks", total_.blocks},
+                                       {"splats", total_.splats},
+                                       {"fragments", total_.fragments},
+                                       {"pieces", total_.pieces},
+                                       {"sentBytes", tiles            ? compositor_.traffic().sentBytes
+                                                     : ranks.isRoot() ? 0
+                                                                      : reducedBytes_},
+                                       {"peakMemoryBytes", peakMemoryBytes()}};
+  ranks.agree();
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  std::vector<uint64_t> splats, pieces;
+  uint64_t blocks = 0, fragments = 0;
+  for (const std::string& text : ranks.gatherEverywhere(mine.dump())) {
+    all.push_back(nlohmann::ordered_json::parse(text));
+    splats.push_back(all.back()["splats"].get<uint64_t>());
+    pieces.push_back(all.back()["pieces"].get<uint64_t>());
+    blocks += all.back()["blocks"].get<uint64_t>();
+    fragments += all.back()["fragments"].get<uint64_t>();
+  }
+  session_.statistics["blocks"] = blocks;
+  session_.statistics["splats"] = std::accumulate(splats.begin(), splats.end(), uint64_t(0));
+  session_.statistics["fragments"] = fragments;
+  session_.statistics["partition"] = partitionName(options_.partition);
+  session_.statistics["balance"] = balance(splats);
+  session_.statistics["balancePieces"] = balance(pieces);
+  session_.statistics["ranks"] = std::move(all);
+}
+
+}  // namespace freevoxel

@@ -1,0 +1,60 @@
+// Splats drawn by all ranks together, every one its share of the blocks (DESIGN section 9). With one rank: drawn.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "app/options.h"
+#include "app/session.h"
+#include "parallel/composite.h"
+#include "parallel/partition.h"
+#include "splat/splat.h"
+
+namespace freevoxel {
+
+/// How pictures of several ranks become one. The bits are the same.
+enum class CompositeMethod { tiles, reduce };
+
+struct ShareOptions {
+  Partition partition;
+  CompositeMethod composite = CompositeMethod::tiles;
+  bool colourByRank = false;  ///< everything in the colour of the rank that drew it (papers/freevoxels Fig. 5)
+};
+/// --partition and --composite.
+void addShareOptions(CLI::App& command, ShareOptions& options);
+
+/// Colour of a rank, sRGB: neighbours far apart in hue.
+glm::dvec3 rankColour(int rank);
+
+/// What the ranks share out, from the blocks that a splatter has.
+std::vector<SharedBlock> sharedBlocks(std::span<const VisibleBlock> blocks);
+
+/// Draws frames of one size. Everything here is collective.
+class SharedDrawing {
+ public:
+  /// All must outlive this. Throws InputError if the ranks do not see the same blocks or the partition will not do.
+  SharedDrawing(Splatter& splatter, const ShareOptions& options, glm::ivec2 imageSize, Session& session);
+
+  /// Sums and statistics: on rank 0 the sums of all, elsewhere of no use; statistics of this rank. The same bits for
+  /// any number of ranks. Throws as Splatter::render does, and RankFailed.
+  SplatResult render(const Camera& camera, const SplatOptions& options);
+
+  /// Fills statistics "ranks" with what every rank did in all frames; nothing for one rank.
+  void report();
+
+ private:
+  Splatter& splatter_;
+  const ShareOptions& options_;
+  Session& session_;
+  std::vector<uint8_t> share_;
+  Compositor compositor_;
+  SplatStatistics total_;
+  double compositeSeconds_ = 0.0;
+  uint64_t reducedBytes_ = 0;
+};
+
+/// Throws InputError, on all ranks, unless `identity` is the same on all of them. Collective. `what` names it: a path.
+void expectSameOnAllRanks(const Ranks& ranks, uint64_t identity, const std::string& what);
+
+}  // namespace freevoxel

@@ -1,0 +1,75 @@
+// The additive composite: images of all ranks become one sum on rank 0 (papers/freevoxels section 4.4; DESIGN section
+// 9).
+//
+// Sums of whole quanta are exact, so any tree of additions gives the same bits. The tree is radix-k (Peterka, Goodell,
+// Ross, Shen, Thakur 2009): in every round a group of k ranks splits the part of the image that it has in common, each
+// adds up one piece of it, and in the end every rank owns one band, which goes to rank 0. A rank sends at most its
+// image once and its band, however many ranks there are, and of both only tiles in which there is anything.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "base/image.h"
+#include "parallel/ranks.h"
+
+namespace freevoxel {
+
+/// Pixels of a tile: consecutive ones of the image in memory order. What travels or stays behind as a whole.
+inline constexpr int kCompositeTile = 64;
+/// Ranks of a group exchange pieces all at once if there are no more than this.
+inline constexpr int kCompositeRadix = 8;
+
+/// Group sizes of the rounds for so many ranks: their product is rankCount, each at most kCompositeRadix unless it is a
+/// prime number above it. Empty for one rank.
+std::vector<int> compositeRounds(int rankCount);
+
+struct CompositeTraffic {
+  uint64_t sentBytes = 0, receivedBytes = 0;
+};
+
+/// Images that are larger are added a slice at a time: it bounds buffers and messages. Pixels.
+inline constexpr size_t kCompositeSlice = size_t(1) << 23;
+
+/// Adds images of one size. Holds buffers of about twice the image, or of a slice of it.
+class Compositor {
+ public:
+  /// `ranks` must outlive this. Not collective.
+  Compositor(const Ranks& ranks, glm::ivec2 imageSize, int channels, size_t slicePixels = kCompositeSlice);
+
+  /// Collective. Adds up the `image` of every rank: on rank 0 it is the sum afterwards, elsewhere what is left in it is
+  /// of no use. No value may be negative. Returns, the same on all ranks, whether every sum stayed below its channel's
+  /// limit; if not, the sum need not be complete.
+  bool add(Image& image, std::span<const float> limits);
+
+  /// Of this rank since the compositor was made.
+  const CompositeTraffic& traffic() const { return traffic_; }
+
+ private:
+  struct Range {
+    size_t first, last;  ///< tiles
+    size_t size() const { return last - first; }
+  };
+  Range piece(Range whole, int pieces, int index) const;
+  size_t packedWords(Range range) const;  ///< at most
+  size_t tileFloats(size_t tile) const;
+  /// Packs the tiles of a range that are not zero; gives the number of words. If `limits` is not empty, clears `below`
+  /// unless all values are below them.
+  size_t pack(const Image& image, Range range, uint32_t* words, std::span<const float> limits, bool& below) const;
+  enum class Unpack { add, replace };
+  template <Unpack how>
+  void unpack(Image& image, Range range, const uint32_t* words) const;
+  bool addSlice(Image& image, Range slice, std::span<const float> limits);
+
+  const Ranks& ranks_;
+  size_t channels_, pixels_, tiles_, sliceTiles_;
+  std::vector<int> rounds_;
+  std::vector<uint32_t> outgoing_, incoming_, gathered_;
+  CompositeTraffic traffic_;
+};
+
+/// The same by one MPI_Reduce of the whole images, for comparison.
+bool addByReduce(const Ranks& ranks, Image& image, std::span<const float> limits);
+
+}  // namespace freevoxel
