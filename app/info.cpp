@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <glm/common.hpp>
 #include <memory>
 #include <numeric>
 
@@ -12,6 +13,8 @@
 #include "base/error.h"
 #include "hierarchy/attenuation_file.h"
 #include "volume/read_volume.h"
+#include "voxlink/read_mesh.h"
+#include "voxlink/read_spheres.h"
 
 namespace freevoxel {
 
@@ -118,6 +121,68 @@ void printHistogram(const Histogram& histogram) {
   }
 }
 
+nlohmann::ordered_json bounds(const std::vector<glm::vec3>& places, float reach) {
+  glm::vec3 low(INFINITY), high(-INFINITY);
+  for (const glm::vec3 place : places) {
+    low = glm::min(low, place - reach);
+    high = glm::max(high, place + reach);
+  }
+  return {triple(low), triple(high)};
+}
+
+const char* kindName(MaterialKind kind) {
+  return kind == MaterialKind::glass ? "glass" : kind == MaterialKind::mirror ? "mirror" : "diffuse";
+}
+
+nlohmann::ordered_json describe(const std::vector<Material>& materials, const std::vector<uint32_t>& users) {
+  std::vector<uint64_t> counts(materials.size(), 0);
+  for (const uint32_t user : users)
+    ++counts[user];
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  constexpr size_t kMostShown = 64;
+  for (size_t i = 0; i < std::min(materials.size(), kMostShown); ++i) {
+    const Material& material = materials[i];
+    list.push_back({{"name", material.name},
+                    {"kind", kindName(material.kind)},
+                    {"linear", triple(material.linear)},
+                    {"opacity", material.opacity},
+                    {"used", counts[i]}});
+  }
+  return list;
+}
+
+nlohmann::ordered_json describe(const MeshFile& file) {
+  const MeshReport& report = file.report;
+  return {{"format", report.format},
+          {"vertices", report.fileVertices},
+          {"triangles", report.fileTriangles},
+          {"bounds", bounds(file.mesh.positions, 0.0f)},
+          {"normals", !file.mesh.normals.empty()},
+          {"nonFiniteVertices", report.nonFiniteVertices},
+          {"nonFiniteTriangles", report.nonFiniteTriangles},
+          {"degenerateTriangles", report.degenerateTriangles},
+          {"linesAndPoints", report.linesAndPoints},
+          {"materialCount", file.mesh.materials.size()},
+          {"materials", describe(file.mesh.materials, file.mesh.materialOfTriangle)},
+          {"notes", report.notes}};
+}
+
+nlohmann::ordered_json describe(const SphereFile& file) {
+  const SphereReport& report = file.report;
+  const auto [least, most] = std::minmax_element(file.spheres.radii.begin(), file.spheres.radii.end());
+  return {{"format", report.format},
+          {"spheres", file.spheres.centres.size()},
+          {"inFile", report.fileSpheres},
+          {"copies", report.copies},
+          {"bounds", bounds(file.spheres.centres, *most)},
+          {"radii", {*least, *most}},
+          {"nonFinite", report.nonFinite},
+          {"withoutRadius", report.withoutRadius},
+          {"materialCount", file.spheres.materials.size()},
+          {"materials", describe(file.spheres.materials, file.spheres.materialOfSphere)},
+          {"notes", report.notes}};
+}
+
 Outcome info(const InfoOptions& options, Session& session) {
   Histogram histogram;
   nlohmann::ordered_json json;
@@ -139,6 +204,12 @@ Outcome info(const InfoOptions& options, Session& session) {
         double(file.fileBytes()) / double(voxels), json["valueBytesPerVoxel"].get<double>(),
         json["attenuationBytesPerVoxel"].get<double>(), json["valueBytesPerStoredVoxel"].get<double>(),
         json["attenuationBytesPerStoredVoxel"].get<double>(), file.command());
+  } else if (isMeshFile(options.input) || (isSphereFile(options.input) && !isVolumeArray(options.input))) {
+    if (hasVolumeOptions(options.raw)) throw UsageError("options for raw volumes make no sense for meshes and spheres");
+    json = session.timed("read", [&] {
+      return isMeshFile(options.input) ? describe(readMesh(options.input)) : describe(readSpheres(options.input));
+    });
+    json["fileBytes"] = fileBytes(options.input);
   } else {
     const Volume volume = session.timed("read", [&] { return readVolume(options.input, options.raw); });
     json = session.timed("measure", [&] { return describe(volume, options.input, histogram); });
@@ -146,7 +217,7 @@ Outcome info(const InfoOptions& options, Session& session) {
     remarks = fmt::format("volume: {} voxels\n", volume.header.voxels());
   }
   session.statistics["fileBytes"] = json["fileBytes"];
-  session.statistics["nonFinite"] = json["nonFinite"];
+  if (json.contains("nonFinite")) session.statistics["nonFinite"] = json["nonFinite"];
   if (options.json) {
     fmt::print("{}\n", json.dump(2));
     return Outcome::done;
@@ -163,15 +234,18 @@ Outcome info(const InfoOptions& options, Session& session) {
 
 Command addInfo(CLI::App& program, CommonOptions& common) {
   auto options = std::make_shared<InfoOptions>();
-  CLI::App* command = addSubcommand(program, "info", "tell what is in an attenuation file or a volume",
-                                    "freevoxel info head.raw.gz --dims 256,256,113 --type u16 --endian big");
-  command->add_option("FILE", options->input, "an attenuation file or a volume")->required();
-  command->add_flag("--json", options->json,
-                    "print JSON: dims, spacing, origin, direction (of each axis), bounds (world), type, range, sum, "
-                    "nonFinite, fileBytes; for an attenuation "
-                    "file also layout, classification, levels, bricks, storedVoxels, occupancy (their share), "
-                    "valueBytes, attenuationBytes, and both per voxel of the volume (...PerVoxel) and per stored voxel "
-                    "(...PerStoredVoxel) (there sum is over stored voxels)");
+  CLI::App* command =
+      addSubcommand(program, "info", "tell what is in an attenuation file, a volume, or a file of meshes or spheres",
+                    "freevoxel info head.raw.gz --dims 256,256,113 --type u16 --endian big");
+  command->add_option("FILE", options->input, "an attenuation file, a volume, a mesh or spheres")->required();
+  command->add_flag(
+      "--json", options->json,
+      "print JSON: dims, spacing, origin, direction (of each axis), bounds (world), type, range, sum, "
+      "nonFinite, fileBytes; for an attenuation "
+      "file also layout, classification, levels, bricks, storedVoxels, occupancy (their share), "
+      "valueBytes, attenuationBytes, and both per voxel of the volume (...PerVoxel) and per stored voxel "
+      "(...PerStoredVoxel) (there sum is over stored voxels); of meshes and spheres what is in them, what "
+      "was left out, and the first 64 materials");
   addVolumeOptions(*command, options->raw);
   addCommonOptions(*command, common);
   return {command, [options](Session& session) { return info(*options, session); }};

@@ -9,6 +9,8 @@
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "precompute/format.h"
+#include "volume/file_start.h"
+#include "volume/numpy_array.h"
 
 namespace freevoxel {
 
@@ -32,6 +34,11 @@ uint64_t fileBytes(const std::string& path) {
     if (entry.is_regular_file(ignored)) bytes += entry.file_size(ignored);
   }
   return bytes;
+}
+
+bool isVolumeArray(const std::string& path) {
+  const FileStart start = readFileStart(path);
+  return isNumpyArray(start) && numpyAxes(start) > 2;
 }
 
 std::string lowerCaseExtension(const std::string& path) {

@@ -17,6 +17,7 @@
 #include "base/error.h"
 #include "parallel/ranks.h"
 #include "volume/child_reader.h"
+#include "voxlink/read_mesh.h"
 
 namespace freevoxel {
 
@@ -129,7 +130,8 @@ int run(int argc, char** argv, const Ranks& ranks) {
 int main(int argc, char** argv) {
   using namespace freevoxel;
   // Files that foreign libraries read are read in a child process, which is this program again.
-  if (argc == 2 && std::string_view(argv[1]) == kReaderArgument) return runLibraryReader();
+  if (argc == 2 && std::string_view(argv[1]) == kReaderArgument) runLibraryReader();
+  if (argc == 2 && std::string_view(argv[1]) == kMeshReaderArgument) runMeshReader();
   cleanUpOnSignals();
   const Ranks ranks(argc, argv);
   int status = kFailed;

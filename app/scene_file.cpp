@@ -3,68 +3,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 
 #include "app/input_file.h"
+#include "app/scene_reading.h"
 #include "base/error.h"
 #include "base/mapped_file.h"
 #include "volume/json_reading.h"
-#include "volume/transfer_presets.h"
 
 namespace freevoxel {
 
 namespace {
 
-constexpr double kLargestPlace = 1e12;
 constexpr double kBrightest = 1000.0;
-
-std::string besideScene(const std::string& scene, const std::string& name) {
-  const std::filesystem::path path(name);
-  return path.is_absolute() ? name : (std::filesystem::path(scene).parent_path() / path).string();
-}
-
-template <class T>
-T oneOf(const JsonPlace& place, std::initializer_list<std::pair<const char*, T>> choices) {
-  const std::string found = place.text();
-  std::string words;
-  for (const auto& [word, value] : choices) {
-    if (found == word) return value;
-    words += fmt::format("{}{}", words.empty() ? "" : ", ", word);
-  }
-  place.fail(fmt::format("expected one of {}, found '{}'", words, found));
-}
-
-ValueType readType(const JsonPlace& place) {
-  return oneOf<ValueType>(place, {{"u8", ValueType::u8},
-                                  {"i8", ValueType::i8},
-                                  {"u16", ValueType::u16},
-                                  {"i16", ValueType::i16},
-                                  {"u32", ValueType::u32},
-                                  {"i32", ValueType::i32},
-                                  {"f32", ValueType::f32},
-                                  {"f64", ValueType::f64}});
-}
-
-VolumeOptions readRaw(const JsonPlace& volume) {
-  VolumeOptions raw;
-  if (volume.has("dims")) {
-    const JsonPlace dims = volume.member("dims");
-    dims.size(3, 3, "[x, y, z]");
-    raw.dims.emplace();
-    for (int axis = 0; axis < 3; ++axis)
-      (*raw.dims)[axis] = int(dims.element(size_t(axis)).whole(1, kMaxDim));
-  }
-  if (volume.has("type")) raw.type = readType(volume.member("type"));
-  if (volume.has("endian")) {
-    raw.byteOrder = oneOf<ByteOrder>(volume.member("endian"), {{"little", ByteOrder::little}, {"big", ByteOrder::big}});
-  }
-  if (volume.has("skip")) raw.skip = uint64_t(volume.member("skip").whole(0, int64_t(1) << 50));
-  if (volume.has("spacing")) raw.spacing = volume.member("spacing").triple(1e-30, 1e30, "[sx, sy, sz]");
-  if (volume.has("component")) raw.component = volume.member("component").text();
-  if (volume.has("frame")) raw.frame = int(volume.member("frame").whole(0, kMaxDim));
-  if (volume.has("labels")) raw.labels = volume.member("labels").flag();
-  return raw;
-}
 
 void readView(const JsonPlace& camera, CameraOptions& options) {
   if (camera.has("orbit")) {
@@ -84,6 +34,39 @@ void readView(const JsonPlace& camera, CameraOptions& options) {
   place("up", options.up);
   if (!options.eye && (options.target || options.up))
     camera.fail("expected a key 'eye' with 'target' or 'up', found none");
+}
+
+/// What the scene shows: one volume, or several objects.
+void readObjects(const JsonPlace& scene, const SceneOptions& options) {
+  const std::string path = options.input;
+  std::string transfer;
+  if (scene.has("transfer")) transfer = transferBesideScene(path, scene.member("transfer").text());
+  if (options.transfer.empty()) options.transfer = transfer;
+  SceneObjects objects = readSceneObjects(scene, path);
+  std::optional<VolumeObject> single;
+  if (scene.has("volume") || objects.empty()) {
+    const JsonPlace volume = scene.member("volume");
+    volume.onlyKeys({"file", "dims", "type", "endian", "skip", "spacing", "component", "frame", "labels"});
+    single.emplace();
+    single->file = besideScene(path, volume.member("file").text());
+    single->raw = hasVolumeOptions(options.raw) ? options.raw : readRawOptions(volume);
+  }
+  if (objects.empty()) {
+    if (!objects.materials.empty())
+      scene.member("materials").fail("expected meshes or spheres with materials, found none");
+    options.input = single->file;
+    options.raw = single->raw;
+    return;
+  }
+  if (options.objects == nullptr) {
+    const char* key = !objects.volumes.empty() ? "volumes" : !objects.meshes.empty() ? "meshes" : "spheres";
+    scene.member(key).fail("only freevoxel trace shows these; expected one 'volume'");
+  }
+  if (single) objects.volumes.insert(objects.volumes.begin(), *single);
+  for (VolumeObject& volume : objects.volumes) {
+    if (volume.transfer.empty()) volume.transfer = options.transfer;
+  }
+  *options.objects = std::move(objects);
 }
 
 Light readLight(const JsonPlace& place) {
@@ -119,22 +102,9 @@ void useScene(const CLI::App& command, const SceneOptions& options) {
   const std::string text(reinterpret_cast<const char*>(file.bytes().data()), file.bytes().size());
   const nlohmann::json document = parseJson(text, path);
   const JsonPlace scene(document, path, jsonLines(text));
-  scene.onlyKeys({"volume", "transfer", "camera", "image", "lights", "ambient", "shading"});
-
-  const JsonPlace volume = scene.member("volume");
-  volume.onlyKeys({"file", "dims", "type", "endian", "skip", "spacing", "component", "frame", "labels"});
-  options.input = besideScene(path, volume.member("file").text());
-  const VolumeOptions raw = readRaw(volume);
-  if (!hasVolumeOptions(options.raw)) options.raw = raw;
-
-  if (scene.has("transfer")) {
-    std::string transfer = scene.member("transfer").text();
-    const std::vector<TransferPreset>& presets = transferPresets();
-    if (std::none_of(presets.begin(), presets.end(), [&](const TransferPreset& p) { return p.name == transfer; })) {
-      transfer = besideScene(path, transfer);
-    }
-    if (options.transfer.empty()) options.transfer = transfer;
-  }
+  scene.onlyKeys({"volume", "transfer", "volumes", "meshes", "spheres", "materials", "camera", "image", "lights",
+                  "ambient", "shading"});
+  readObjects(scene, options);
 
   if (scene.has("camera")) {
     const JsonPlace camera = scene.member("camera");

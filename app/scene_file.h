@@ -6,17 +6,19 @@
 #include "app/light_options.h"
 #include "app/options.h"
 #include "app/picture_output.h"
+#include "app/scene_objects.h"
 
 namespace freevoxel {
 
 /// The options of a command that a scene file may set.
 struct SceneOptions {
-  std::string& input;     ///< in: the scene file; out: the volume
+  std::string& input;     ///< in: the scene file; out: its one volume
   std::string& transfer;  ///< empty: none
   VolumeOptions& raw;
   CameraOptions& camera;
   LightOptions& light;
   PictureOptions& picture;
+  SceneObjects* objects = nullptr;  ///< several objects, if the command can show them; then input stays the scene
 };
 
 /// Whether a file is taken for a scene, by its extension.

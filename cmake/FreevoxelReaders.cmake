@@ -1,4 +1,5 @@
-# OpenVDB and GDCM, whose own CMake files want more than their Debian packages hold. Their headers are theirs to warn of.
+# OpenVDB and GDCM, whose own CMake files want more than their Debian packages hold, and Assimp. Their headers are theirs
+# to warn of.
 
 function(freevoxel_find_library target header folder)
   find_path(${target}_INCLUDE ${header} PATH_SUFFIXES ${folder} REQUIRED)
@@ -12,3 +13,4 @@ endfunction()
 
 freevoxel_find_library(OpenVDB::openvdb openvdb/openvdb.h "" openvdb tbb Imath)
 freevoxel_find_library(GDCM::gdcm gdcmImageReader.h gdcm-3.0 gdcmMSFF gdcmDSED gdcmDICT gdcmCommon)
+freevoxel_find_library(Assimp::assimp assimp/Importer.hpp "" assimp)

@@ -11,6 +11,8 @@ packages=(
   libglm-dev libopenimageio-dev libopenmpi-dev openmpi-bin libhwy-dev libzstd-dev zlib1g-dev libxxhash-dev
   # foreign volume formats (OpenVDB's headers want Boost's, and its package does not say so)
   libopenvdb-dev libboost-dev libgdcm-dev
+  # meshes
+  libassimp-dev
   # command line, text
   libcli11-dev libspdlog-dev libfmt-dev nlohmann-json3-dev
   # tests and benchmarks

@@ -1,12 +1,13 @@
-// What parent and child of volume/child_reader.h say to each other, in this machine's byte order.
+// What parent and child of volume/child_process.h say to each other, in this machine's byte order.
 //
-//   request   uint64 size, then: uint32 format, three flags (component, spacing, labels: uint32 each), double
-//   spacing[3],
-//             uint64 memory, uint64 processor seconds, and the strings component, path, files..., each uint64 size and
-//             bytes.
-//   answer    messages: uint32 kind, uint32 0, uint64 size, `size` bytes. First a header or an error; then values,
-//   slices
-//             in order in any portions, or an error; last an end.
+//   request   uint64 size, then: uint64 memory, uint64 processor seconds, text path (uint64 size and bytes), and what
+//   the
+//             kind of reader takes.
+//   answer    messages: uint32 kind, uint32 0, uint64 size, `size` bytes. First a header or an error; then values, in
+//             order in any portions, or an error; last an end.
+//
+// Of a volume (volume/child_reader.h) the request goes on with uint32 format, three flags (component, spacing, labels:
+// uint32 each), double spacing[3], the texts component, files...; values are its slices.
 #pragma once
 
 #include <array>

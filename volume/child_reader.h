@@ -1,10 +1,5 @@
-// Files that foreign libraries read, read in a child process: what such a library does with a damaged file (die, hang,
-// eat memory) happens there, and here it is one line (DESIGN section 11).
-//
-// The child is this same program started again with one hidden argument (app/main.cpp hands over to runLibraryReader),
-// never a mere fork, so it does not matter what threads and what OpenGL the parent has by then. The request goes to its
-// standard input, the volume comes back slice by slice through a pipe (volume/child_messages.h), so it is nowhere whole
-// but where the caller puts it.
+// Volumes that foreign libraries read, read in a child process (volume/child_process.h). They come back slice by slice,
+// so a volume is nowhere whole but where the caller puts it.
 #pragma once
 
 #include <cstdint>
@@ -14,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "volume/child_process.h"
 #include "volume/read_volume.h"
 
 namespace freevoxel {
@@ -31,30 +27,14 @@ struct LibraryRequest {
   bool labels = false;
 };
 
-/// What a child may use. Memory is address space: this much and 16 times the size of the files, but no more than the
-/// machine has.
-struct ChildLimits {
-  uint64_t memoryBytes = uint64_t(4) << 30;
-  uint64_t memoryPerFileByte = 16;
-  int processorSeconds = 600;
-  int silentSeconds = 60;  ///< waiting for it without anything coming
-};
-
-/// The program that reads, and its limits; one for the process, for tests to change before they read.
-struct ChildProgram {
-  std::string path = "/proc/self/exe";
-  ChildLimits limits;
-};
-ChildProgram& childProgram();
-
-/// The argument that makes the program a reader, the only one it is given.
+/// The argument that makes the program a reader of volumes.
 inline constexpr const char* kReaderArgument = "--read-with-library";
 
 /// Starts a child and waits until it has read the header. Throws InputError (what the child says, or how it ended) or
 /// MachineError (it cannot be started).
 std::unique_ptr<VolumeSource> openWithLibrary(const LibraryRequest& request);
 
-/// The child: reads the request from standard input, answers, returns the exit status.
-int runLibraryReader();
+/// The child: reads the request from standard input, answers, ends the process.
+[[noreturn]] void runLibraryReader();
 
 }  // namespace freevoxel

@@ -152,11 +152,19 @@ void JsonPlace::fail(const std::string& what) const {
 }
 
 void JsonPlace::failAt(const std::string& place, const std::string& what) const {
+  throw InputError(fmt::format("{}: {}", whereAt(place), what));
+}
+
+std::string JsonPlace::where() const {
+  return whereAt(way_);
+}
+
+std::string JsonPlace::whereAt(const std::string& place) const {
   std::string where = file_;
   if (lines_ != nullptr) {
     if (const auto line = lines_->find(place); line != lines_->end()) where += fmt::format(": line {}", line->second);
   }
-  throw InputError(way_.empty() ? fmt::format("{}: {}", where, what) : fmt::format("{}: {}: {}", where, way_, what));
+  return way_.empty() ? where : fmt::format("{}: {}", where, way_);
 }
 
 std::string JsonPlace::found() const {

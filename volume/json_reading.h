@@ -28,6 +28,8 @@ class JsonPlace {
       : value_(&value), file_(std::move(file)), lines_(std::move(lines)) {}
 
   [[noreturn]] void fail(const std::string& what) const;
+  /// What errors begin with: file, line, and the way there.
+  std::string where() const;
 
   bool has(const char* key) const { return value_->is_object() && value_->contains(key); }
   /// Fails unless this is an object with that key.
@@ -58,6 +60,8 @@ class JsonPlace {
     place.way_ = std::move(way);
     return place;
   }
+  /// With the line of another place.
+  std::string whereAt(const std::string& place) const;
   /// Fails with the line of another place.
   [[noreturn]] void failAt(const std::string& place, const std::string& what) const;
   std::string found() const;

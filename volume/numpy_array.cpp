@@ -95,23 +95,34 @@ bool parseFortranOrder(const NumpyHeader& header) {
   return false;
 }
 
-std::vector<int> parseShape(const NumpyHeader& header) {
+std::vector<int64_t> parseShape(const NumpyHeader& header) {
   const std::string_view value = header.value("shape");
   const size_t end = value.find(')');
   if (!value.starts_with('(') || end == std::string_view::npos) header.fail("expected a shape (z, y, x)");
   std::string numbers(value.substr(1, end - 1));
   std::replace(numbers.begin(), numbers.end(), ',', ' ');
-  std::vector<int> shape;
+  std::vector<int64_t> shape;
   for (const std::string_view part : words(numbers)) {
-    const int size = parseNumber<int>(part).value_or(0);
-    if (size < 1 || size > kMaxDim)
-      header.fail(fmt::format("expected sizes in 1..{}, found {}", kMaxDim, inQuotes(part)));
-    shape.push_back(size);
+    const std::optional<int64_t> size = parseNumber<int64_t>(part);
+    if (!size || *size < 0) header.fail("expected a size, found " + inQuotes(part));
+    shape.push_back(*size);
+  }
+  return shape;
+}
+
+std::vector<int> volumeShape(const NumpyHeader& header) {
+  const std::vector<int64_t> shape = parseShape(header);
+  for (const int64_t size : shape) {
+    if (size < 1 || size > kMaxDim) header.fail(fmt::format("expected sizes in 1..{}, found '{}'", kMaxDim, size));
   }
   if (shape.size() != 3 && shape.size() != 4) {
     header.fail(fmt::format("expected an array of 3 axes [z][y][x], found {}", shape.size()));
   }
-  return shape;
+  return {shape.begin(), shape.end()};
+}
+
+ByteOrder byteOrderOf(const std::string& description) {
+  return description[0] == '>' ? ByteOrder::big : ByteOrder::little;
 }
 
 }  // namespace
@@ -120,15 +131,34 @@ bool isNumpyArray(const FileStart& start) {
   return start.startsWith("\x93NUMPY") || start.extension == ".npy";
 }
 
+size_t numpyAxes(const FileStart& start) {
+  return parseShape(readHeader(start)).size();
+}
+
+NumpyTable readNumpyTable(const FileStart& start) {
+  const NumpyHeader header = readHeader(start);
+  const std::string description = parseDescription(header);
+  NumpyTable table;
+  table.type = parseType(header, description);
+  table.byteOrder = byteOrderOf(description);
+  table.columnsFirst = parseFortranOrder(header);
+  table.bytesBefore = header.textOffset + header.text.size();
+  const std::vector<int64_t> shape = parseShape(header);
+  if (shape.size() != 2) header.fail(fmt::format("expected an array of 2 axes, found {}", shape.size()));
+  table.rows = uint64_t(shape[0]);
+  table.columns = uint64_t(shape[1]);
+  return table;
+}
+
 Payload readNumpyHeader(const FileStart& start, const VolumeOptions& options) {
   const NumpyHeader header = readHeader(start);
   const std::string description = parseDescription(header);
   const bool fortran = parseFortranOrder(header);
-  std::vector<int> shape = parseShape(header);
+  std::vector<int> shape = volumeShape(header);
 
   Payload payload;
   setStoredType(payload, parseType(header, description));
-  payload.byteOrder = description[0] == '>' ? ByteOrder::big : ByteOrder::little;
+  payload.byteOrder = byteOrderOf(description);
   payload.files = {start.path};
   payload.compressed = start.compressed;
   payload.byteSkip = header.textOffset + header.text.size();

@@ -56,5 +56,5 @@ int main() {
     return write(STDOUT_FILENO, nonsense.data(), nonsense.size()) < 0 ? 1 : 0;
   }
   if (asked(".leave.vdb")) return 3;
-  return freevoxel::runLibraryReader();
+  freevoxel::runLibraryReader();
 }
