@@ -104,7 +104,7 @@ std::vector<int64_t> parseShape(const NumpyHeader& header) {
   std::vector<int64_t> shape;
   for (const std::string_view part : words(numbers)) {
     const std::optional<int64_t> size = parseNumber<int64_t>(part);
-    if (!size || *size < 0) header.fail("expected a size, found " + inQuotes(part));
+    if (!size) header.fail("expected a size, found " + inQuotes(part));
     shape.push_back(*size);
   }
   return shape;
@@ -145,6 +145,9 @@ NumpyTable readNumpyTable(const FileStart& start) {
   table.bytesBefore = header.textOffset + header.text.size();
   const std::vector<int64_t> shape = parseShape(header);
   if (shape.size() != 2) header.fail(fmt::format("expected an array of 2 axes, found {}", shape.size()));
+  for (const int64_t size : shape) {
+    if (size < 0) header.fail(fmt::format("expected sizes of 0 or more, found {}", size));
+  }
   table.rows = uint64_t(shape[0]);
   table.columns = uint64_t(shape[1]);
   return table;
