@@ -43,22 +43,18 @@ BrickGrid brickGrid(int edge, glm::ivec3 low, glm::ivec3 high);
 /// Throws InputError unless edge is 4, 8 or 16.
 void checkBrickEdge(int edge);
 
-/// A volume's voxels whose opacity is above a threshold.
+/// Which voxels are filled, and where what they hold starts: stored voxels are counted in the order of headers, lists
+/// and z.
 /// Invariant: brickWords has one word per 32 bricks of the grid; brickHeaders has occupied bricks * headerWords(edge)
-/// words in the order of the grid; fragments are in the order of headers, lists and z.
-struct VoxLinkBuffers {
-  glm::ivec3 dims{0};  ///< of the volume
-  Placement placement;
+/// words in the order of the grid.
+struct BrickLists {
   BrickGrid grid;
   std::vector<BrickWord> brickWords;
   std::vector<uint32_t> brickHeaders;
-  std::vector<uint32_t> fragments;  ///< one per stored voxel
 
   uint64_t occupiedBricks() const { return brickHeaders.size() / size_t(shared::headerWords(grid.edge)); }
-  /// Of all buffers, the materials for `codes` codes among them.
-  uint64_t bytes(size_t codes) const {
-    return brickWords.size() * sizeof(BrickWord) + (brickHeaders.size() + fragments.size()) * sizeof(uint32_t) +
-           codes * sizeof(VoxelMaterial);
+  uint64_t listBytes() const {
+    return brickWords.size() * sizeof(BrickWord) + brickHeaders.size() * sizeof(uint32_t);
   }
 
   /// Header of the brick at a brick position inside the grid; null if it is empty.
@@ -69,6 +65,18 @@ struct VoxLinkBuffers {
     if ((word.occupied >> bit & 1u) == 0) return nullptr;
     const uint32_t rank = word.rank + uint32_t(std::popcount(word.occupied & ((1u << bit) - 1u)));
     return brickHeaders.data() + size_t(rank) * size_t(shared::headerWords(grid.edge));
+  }
+};
+
+/// A volume's voxels whose opacity is above a threshold.
+struct VoxLinkBuffers : BrickLists {
+  glm::ivec3 dims{0};  ///< of the volume
+  Placement placement;
+  std::vector<uint32_t> fragments;  ///< one per stored voxel
+
+  /// Of all buffers, the materials for `codes` codes among them.
+  uint64_t bytes(size_t codes) const {
+    return listBytes() + fragments.size() * sizeof(uint32_t) + codes * sizeof(VoxelMaterial);
   }
   /// Fragment of a voxel of the volume; nothing if it is not stored.
   std::optional<uint32_t> find(glm::ivec3 voxel) const;
@@ -101,7 +109,7 @@ void checkFragmentCount(uint64_t fragments);
 
 /// Calls f(fragment index, voxel) for every stored voxel, bricks in parallel.
 template <class F>
-void forEachStoredVoxel(const VoxLinkBuffers& buffers, F&& f) {
+void forEachStoredVoxel(const BrickLists& buffers, F&& f) {
   const BrickGrid& grid = buffers.grid;
 #pragma omp parallel for schedule(dynamic, 64)
   for (int64_t at = 0; at < int64_t(grid.bricks()); ++at) {
