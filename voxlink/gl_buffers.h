@@ -12,6 +12,7 @@
 #include "gl/context.h"
 #include "gl/objects.h"
 #include "voxlink/buffers.h"
+#include "voxlink/gl_memory.h"
 #include "voxlink/shadows.h"
 
 namespace freevoxel {
@@ -49,15 +50,13 @@ class GlVoxLink {
   static constexpr int kMostSteps = 32768;
 
  private:
-  gl::Buffer allocate(uint64_t bytes, const char* what);
-  void release(gl::Buffer& buffer);
   void count(const ValueGrid& grid, const std::vector<uint8_t>& stored, Progress& progress);
-  void sumUp(const gl::Buffer& entries, uint64_t count);
   void uploadSlab(const ValueGrid& grid, int layer);
   void useBuffers(const gl::Program& program) const;
 
-  uint64_t memoryLimit_, largestBuffer_, used_ = 0;
-  gl::Program countVoxels_, sumBlocks_, addBlockSums_, fillBrickWords_, fillBricks_, traceShadows_, lightVoxels_,
+  GlMemory memory_;
+  PrefixSum prefixSum_;
+  gl::Program countVoxels_, fillBrickWords_, fillBricks_, traceShadows_, lightVoxels_,
       traceRays_;
   glm::ivec3 dims_{0};
   Placement placement_;

@@ -178,26 +178,47 @@ SHARED_FUNCTION vec3 unpackDirection(uint packed_) {
 
 // ---- rays ----
 
-// A ray on its way. `through`: share of the light that it still carries (view ray). A shadow ray carries light to a pixel
-// that it adds when it reaches the lamp.
+// A ray on its way.
 struct RayRecord {
   float originX, originY, originZ;           // voxels
-  float t;                                   // where it is, in voxels from there
+  float start;                               // where it begins, in voxels from there
   float directionX, directionY, directionZ;  // unit vector
-  float through;                             // view ray: 1 - opacity so far; shadow ray: where it ends
-  float red, green, blue;                    // shadow ray: the light it brings
-  float ignoreUntil;                         // surfaces `ignored` are not met before
-  int x, y, z;                               // the voxel it is in
-  int last;      // fragment of the voxel met last at t, counted from its first; -1: none
-  uint pixel;    // y * width + x
-  uint state;    // depth, kShadowRay, kThrownBack
-  uint ignored;  // surfaceKey of the surface it leaves
-  uint inside;   // material of the glass it is in + 1; 0: none
+  float end;                                 // shadow ray: the lamp
+  float red, green, blue;                    // shadow ray: the light it brings to its pixel
+  float through;                             // 1 - opacity of what it passed
+  int x, y, z;                               // the voxel it is in,
+  float t;                                   // where it entered it,
+  float at;                                  // and where it is in it;
+  int last;                                  // fragment of the voxel met there, counted from its first; -1: none
+  float ignoreUntil;                         // surfaces like `ignored` are not met before
+  uint ignored;                              // surfaceKey of the surface it leaves
+  uint inside;                               // material of the glass it is in + 1; 0: none
+  uint pixel;                                // y * width + x
+  uint state;                                // depth, kShadowRay, kThrownBack
+  uint unused;
 };
 SHARED_CONSTANT uint kShadowRay = 1u << 31;
 // The ray started at a surface that it did not go through.
 SHARED_CONSTANT uint kThrownBack = 1u << 30;
 SHARED_CONSTANT uint kDepthBits = 0xffu;
+
+// What a pass over rays is about to do, and has done. Rays that wait lie on a stack; a pass takes rays from its top, and
+// pixels that have not had theirs, as many as leave room for all that may come of them.
+struct RayControl {
+  uint waiting;     // on the stack
+  uint nextPixel;   // in tiles of 8 x 8
+  uint fromStack;   // of this pass
+  uint fromPixels;  // of this pass
+  uint firstPixel;  // of this pass
+  uint born;        // rays, during this pass
+  uint rays, raysHigh;  // before it: 2^32 raysHigh + rays
+  uint copyGroups, copyY, copyZ;     // of the pass that takes rays off the stack
+  uint traceGroups, traceY, traceZ;  // of the pass that traces
+  uint passes;
+  uint unused;
+};
+// Rays per group of a pass.
+SHARED_CONSTANT uint kRayGroup = 64u;
 
 // A surface as rays know it again: its material, and the side from which it is met.
 SHARED_FUNCTION uint surfaceKey(uint material, bool leaving) {

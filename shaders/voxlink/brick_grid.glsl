@@ -1,9 +1,8 @@
-// Where bricks are found (voxlink/buffers.h). Bindings 0 to 2 and locations 0 to 4 of every pass over the buffers.
+// Where bricks are found (voxlink/buffers.h). Bindings 0 and 1 and locations 0 to 4 of every pass over the buffers.
 #include "shaders/shared/voxlink.h"
 
 layout(std430, binding = 0) readonly buffer BrickWords { BrickWord brickWords[]; };
 layout(std430, binding = 1) readonly buffer BrickHeaders { uint brickHeaders[]; };
-layout(std430, binding = 2) readonly buffer Fragments { uint fragmentBuffer[]; };
 
 layout(location = 0) uniform ivec3 boxLow;   // of the stored voxels
 layout(location = 1) uniform ivec3 boxHigh;  // exclusive

@@ -4,6 +4,7 @@ layout(local_size_x = 64) in;
 
 #include "shaders/voxlink/brick_grid.glsl"
 
+layout(std430, binding = 2) readonly buffer Fragments { uint fragmentBuffer[]; };
 layout(std430, binding = 3) readonly buffer Shares { uint shares[]; };
 layout(std430, binding = 4) writeonly buffer Light { uint voxelLight[]; };
 // Two vec4 per lamp: place or direction, in shortest voxel edges and world axes, and 1 if it is a direction; colour.

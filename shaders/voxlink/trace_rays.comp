@@ -3,6 +3,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 
 #include "shaders/voxlink/walk.glsl"
 
+layout(std430, binding = 2) readonly buffer Fragments { uint fragmentBuffer[]; };
 layout(std430, binding = 3) readonly buffer Materials { VoxelMaterial materialBuffer[]; };
 layout(std430, binding = 4) readonly buffer Light { uint voxelLight[]; };
 layout(std430, binding = 5) buffer Rays { RayState rays[]; };

@@ -3,6 +3,7 @@ layout(local_size_x = 64) in;
 
 #include "shaders/voxlink/walk.glsl"
 
+layout(std430, binding = 2) readonly buffer Fragments { uint fragmentBuffer[]; };
 layout(std430, binding = 3) readonly buffer Materials { VoxelMaterial materialBuffer[]; };
 // A byte per lamp and fragment.
 layout(std430, binding = 4) buffer Shares { uint shares[]; };

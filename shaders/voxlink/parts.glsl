@@ -1,0 +1,86 @@
+// One triangle in one voxel, in small integers (voxlink/scene_buffers.cpp, Voxeliser::part).
+#include "shaders/voxlink/triangle.glsl"
+
+layout(std430, binding = 3) readonly buffer Triangles { SnappedTriangle triangles[]; };
+layout(std430, binding = 4) readonly buffer Corners { uint corners[]; };
+layout(std430, binding = 5) readonly buffer Normals { float normals[]; };  // of vertices
+// Eight per fragment: sums of slopes, height and normal, how many, and the reach.
+layout(std430, binding = 6) buffer Sums { int sums[]; };
+layout(std430, binding = 7) buffer FragmentOfEntry { uint fragmentOfEntry[]; };
+layout(std430, binding = 8) readonly buffer VoxelOfPlace { uint placeBricks[]; };  // brick of each occupied one
+
+layout(location = 1) uniform ivec3 dims;
+layout(location = 2) uniform int edge;
+layout(location = 3) uniform int hasNormals;
+
+struct TrianglePart {
+  int slopeU, slopeV, height;
+  ivec3 normal;
+};
+
+int bitsOf(int64_t x) {
+  uvec2 words = unpackUint2x32(uint64_t(magnitude(x)));
+  return words.y != 0u ? findMSB(words.y) + 33 : findMSB(words.x) + 1;
+}
+int shifted(int64_t x, int shift) {
+  return shift >= 0 ? int(x >> shift) : int(x * (int64_t(1) << -shift));
+}
+int shiftedInt(int x, int shift) {
+  return shift >= 0 ? x >> shift : x * (1 << -shift);
+}
+ivec3 scaledTo11Bits(ivec3 v) {
+  ivec3 size = abs(v);
+  int shift = findMSB(uint(max(max(size.x, size.y), size.z))) + 1 - 11;
+  return ivec3(shiftedInt(v.x, shift), shiftedInt(v.y, shift), shiftedInt(v.z, shift));
+}
+
+ivec3 voxelAt(uint place) {
+  uint perBrick = uint(edge * edge * edge), local = place % perBrick;
+  uint brick = placeBricks[place / perBrick];
+  uvec3 size = uvec3((dims + edge - 1) / edge);
+  uint e = uint(edge), column = local / e;
+  return ivec3(brick % size.x, brick / size.x % size.y, brick / (size.x * size.y)) * edge +
+         ivec3(column % e, column / e, local % e);
+}
+
+ivec3 vertexNormal(uint vertex) {
+  return ivec3(snapped(normals[3u * vertex], 0.0, 1024.0), snapped(normals[3u * vertex + 1u], 0.0, 1024.0),
+               snapped(normals[3u * vertex + 2u], 0.0, 1024.0));
+}
+
+TrianglePart partOf(uint number, ivec3 voxel) {
+  SnappedTriangle t = triangles[number];
+  int axis = int(t.axis), u = (axis + 1) % 3, v = (axis + 2) % 3;
+  ivec3 centre = voxel * kSubvoxels + kHalf;
+  int64_t wide[3] = int64_t[3](normalOf(t, 0), normalOf(t, 1), normalOf(t, 2));
+  int shift = bitsOf(wide[axis]) - 15;
+  ivec3 normal = ivec3(shifted(wide[0], shift), shifted(wide[1], shift), shifted(wide[2], shift));
+  TrianglePart part;
+  part.slopeU = slopeOf(normal[u], normal[axis]);
+  part.slopeV = slopeOf(normal[v], normal[axis]);
+  part.height = heightOf(shifted(-aboveOf(t, wide, centre), shift), normal[axis]);
+  part.normal = scaledTo11Bits(normal);
+  if (hasNormals == 0) return part;
+  int64_t whole = magnitude(wide[axis]);
+  int weightShift = max(0, bitsOf(whole) - 15);
+  int turn = wide[axis] < 0 ? -1 : 1;
+  ivec3 sum = ivec3(0);
+  for (int k = 0; k < 3; ++k) {
+    int a = (k + 1) % 3, b = (k + 2) % 3;
+    int64_t inside =
+        int64_t(turn) * (int64_t(placeOf(t, b, u) - placeOf(t, a, u)) * int64_t(centre[v] - placeOf(t, a, v)) -
+                         int64_t(placeOf(t, b, v) - placeOf(t, a, v)) * int64_t(centre[u] - placeOf(t, a, u)));
+    if (inside < 0) inside = int64_t(0);
+    if (inside > whole) inside = whole;
+    sum += shifted(inside, weightShift) * vertexNormal(corners[3u * number + uint(k)]);
+  }
+  if (sum != ivec3(0)) part.normal = scaledTo11Bits(sum);
+  return part;
+}
+
+// Mean plane of a fragment.
+ivec3 meanPlane(uint fragment) {
+  int many = sums[8u * fragment + 6u];
+  return ivec3(quotient(sums[8u * fragment], many), quotient(sums[8u * fragment + 1u], many),
+               quotient(sums[8u * fragment + 2u], many));
+}
