@@ -53,9 +53,7 @@ struct BrickLists {
   std::vector<uint32_t> brickHeaders;
 
   uint64_t occupiedBricks() const { return brickHeaders.size() / size_t(shared::headerWords(grid.edge)); }
-  uint64_t listBytes() const {
-    return brickWords.size() * sizeof(BrickWord) + brickHeaders.size() * sizeof(uint32_t);
-  }
+  uint64_t listBytes() const { return brickWords.size() * sizeof(BrickWord) + brickHeaders.size() * sizeof(uint32_t); }
 
   /// Header of the brick at a brick position inside the grid; null if it is empty.
   const uint32_t* header(glm::ivec3 brick) const {

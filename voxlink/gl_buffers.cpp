@@ -95,7 +95,7 @@ void GlVoxLink::build(const ValueGrid& grid, const std::vector<uint8_t>& stored,
   }
   progress.begin("building", 2 * uint64_t(bricks.z), "layers");
   slab_ = memory_.allocate(uint64_t(dims_.x) * uint64_t(dims_.y) * uint64_t(std::min(dims_.z, brickEdge + 2)) * 2,
-                   "a slab of the volume");
+                           "a slab of the volume");
   counts_ = memory_.allocate((brickCount + 1) * 8, "the count of voxels per brick");
   count(grid, stored, progress);
   std::array<int32_t, 6> box{};

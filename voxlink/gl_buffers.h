@@ -56,8 +56,7 @@ class GlVoxLink {
 
   GlMemory memory_;
   PrefixSum prefixSum_;
-  gl::Program countVoxels_, fillBrickWords_, fillBricks_, traceShadows_, lightVoxels_,
-      traceRays_;
+  gl::Program countVoxels_, fillBrickWords_, fillBricks_, traceShadows_, lightVoxels_, traceRays_;
   glm::ivec3 dims_{0};
   Placement placement_;
   BrickGrid bricks_;

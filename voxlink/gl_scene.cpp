@@ -32,7 +32,8 @@ std::span<const std::byte> bytesOf(const std::vector<T>& data) {
 void requireIntegers() {
   if (!epoxy_has_gl_extension("GL_ARB_gpu_shader_int64")) {
     throw MachineError(
-        "VoxLink: this OpenGL driver has no 64-bit integers (GL_ARB_gpu_shader_int64), which scenes are voxelised with; "
+        "VoxLink: this OpenGL driver has no 64-bit integers (GL_ARB_gpu_shader_int64), which scenes are voxelised "
+        "with; "
         "use --backend cpu");
   }
 }
@@ -299,10 +300,9 @@ void GlScene::build(const SceneVoxels& scene, int brickEdge, uint64_t& degenerat
   bindStorage({&starts, &voxels_});
   dispatchMany(copyStarts_, (voxelCount_ + 1 + 63) / 64);
   glFinish();
-  for (gl::Buffer* temporary :
-       {&inputs.positions, &inputs.corners, &inputs.normals, &inputs.materialOfTriangle, &inputs.triangles,
-        &inputs.samples, &inputs.degenerate, &table_, &brickCounts_, &entries_, &starts, &most, &placeBricks, &box,
-        &sums, &fragmentOfEntry, &directions})
+  for (gl::Buffer* temporary : {&inputs.positions, &inputs.corners, &inputs.normals, &inputs.materialOfTriangle,
+                                &inputs.triangles, &inputs.samples, &inputs.degenerate, &table_, &brickCounts_,
+                                &entries_, &starts, &most, &placeBricks, &box, &sums, &fragmentOfEntry, &directions})
     memory_.release(*temporary);
   progress.end();
 }
@@ -349,10 +349,10 @@ Image GlScene::trace(const SceneTracing& tracing, const Camera& camera, int step
   const uint64_t largest = std::max(records / 4, uint64_t(1));
   const uint64_t capacity = records - std::min(records, largest);
   if (capacity < 2 * reserve + 2 * (newPerRay + 1)) {
-    throw MachineError(fmt::format("VoxLink: {} bytes of ray buffer are too few for {} lamps and {} reflections, which "
-                                   "need {}; raise --ray-buffer",
-                                   rayBytes_, lampCount, tracing.maxDepth,
-                                   4 * (2 * reserve + 2 * (newPerRay + 1)) * sizeof(RayRecord)));
+    throw MachineError(fmt::format(
+        "VoxLink: {} bytes of ray buffer are too few for {} lamps and {} reflections, which "
+        "need {}; raise --ray-buffer",
+        rayBytes_, lampCount, tracing.maxDepth, 4 * (2 * reserve + 2 * (newPerRay + 1)) * sizeof(RayRecord)));
   }
   const glm::ivec2 size = camera.imageSize;
   const uint64_t tiled = uint64_t((size.x + 7) / 8) * uint64_t((size.y + 7) / 8) * 64;

@@ -39,8 +39,8 @@ class GlScene {
   /// lightVolumes, or nothing.
   void setVolumeLight(std::span<const uint32_t> light);
 
-  /// Like traceScene. `steps` of every ray per pass, 1 to kMostSteps; the number of steps and the size of the ray buffer
-  /// change no bit.
+  /// Like traceScene. `steps` of every ray per pass, 1 to kMostSteps; the number of steps and the size of the ray
+  /// buffer change no bit.
   Image trace(const SceneTracing& tracing, const Camera& camera, int steps, uint64_t& rays, int& passes,
               Progress& progress);
 

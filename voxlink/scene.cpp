@@ -84,8 +84,8 @@ void SceneVoxLink::State::build(const TracedScene& scene, Progress& progress) {
                            SceneBuffers::sceneTableBytes(voxels);
 }
 
-SceneVoxLink::SceneVoxLink(const TracedScene& scene, const SceneVoxLinkOptions& options,
-                           const gl::Context* context, Progress& progress)
+SceneVoxLink::SceneVoxLink(const TracedScene& scene, const SceneVoxLinkOptions& options, const gl::Context* context,
+                           Progress& progress)
     : state_(std::make_unique<State>()) {
   checkOptions(options);
   State& state = *state_;
@@ -128,8 +128,7 @@ Image SceneVoxLink::trace(const Camera& camera, Progress& progress) {
   State& state = *state_;
   const Timer timer(state.statistics.traceSeconds);
   std::vector<uint32_t> light;
-  if (!state.lighting.unlit())
-    light = lightVolumes(state.buffers, state.voxels, state.lighting, state.shares, camera);
+  if (!state.lighting.unlit()) light = lightVolumes(state.buffers, state.voxels, state.lighting, state.shares, camera);
   const SceneTracing tracing{state.lighting, state.shadows, state.options.maxDepth};
   if (state.onGpu) {
     state.onGpu->setVolumeLight(light);

@@ -58,10 +58,10 @@ struct SceneVoxLinkStatistics {
   uint64_t fragments = 0;     ///< several in a voxel count each
   uint64_t bricks = 0;        ///< of the grid over the stored voxels
   uint64_t occupiedBricks = 0;
-  uint64_t bufferBytes = 0;         ///< of everything that tracing reads
+  uint64_t bufferBytes = 0;          ///< of everything that tracing reads
   uint64_t degenerateTriangles = 0;  ///< left out: no area once vertices are snapped to 1/256 voxel
-  uint64_t rays = 0;                ///< of the last picture, those that were stored for a later pass among them
-  int passes = 0;                   ///< of the last picture
+  uint64_t rays = 0;                 ///< of the last picture, those that were stored for a later pass among them
+  int passes = 0;                    ///< of the last picture
   double buildSeconds = 0, shadowSeconds = 0, traceSeconds = 0;  ///< sums over all calls
 };
 

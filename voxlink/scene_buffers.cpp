@@ -12,14 +12,16 @@ namespace freevoxel {
 
 namespace {
 
-/// Something in a voxel of a brick. `key` orders what is in one voxel: kind, then material and face of a triangle, number
-/// of a sphere, or volume; `reference` is the number of the triangle or sample.
+/// Something in a voxel of a brick. `key` orders what is in one voxel: kind, then material and face of a triangle,
+/// number of a sphere, or volume; `reference` is the number of the triangle or sample.
 struct Entry {
   uint32_t place;  ///< of the voxel in its brick: lists x fastest, then z
   uint32_t key;
   uint32_t reference;
   bool operator<(const Entry& other) const {
-    return place != other.place ? place < other.place : key != other.key ? key < other.key : reference < other.reference;
+    return place != other.place ? place < other.place
+           : key != other.key   ? key < other.key
+                                : reference < other.reference;
   }
 };
 
@@ -53,9 +55,15 @@ class Voxeliser {
       usable_[i] = triangle(i).degenerate() ? 0 : 1;
   }
 
-  uint64_t degenerate() const { return uint64_t(std::count(usable_.begin(), usable_.end(), uint8_t(0))); }
-  glm::ivec3 bricks() const { return bricks_; }
-  uint64_t brickOf(glm::ivec3 voxel) const { return linearIndex(voxel / edge_, bricks_); }
+  uint64_t degenerate() const {
+    return uint64_t(std::count(usable_.begin(), usable_.end(), uint8_t(0)));
+  }
+  glm::ivec3 bricks() const {
+    return bricks_;
+  }
+  uint64_t brickOf(glm::ivec3 voxel) const {
+    return linearIndex(voxel / edge_, bricks_);
+  }
   uint32_t placeOf(glm::ivec3 voxel) const {
     const glm::ivec3 local = voxel % edge_;
     return uint32_t((local.y * edge_ + local.x) * edge_ + local.z);
@@ -135,7 +143,8 @@ class Voxeliser {
     glm::ivec3 sum(0);
     for (size_t k = 0; k < 3; ++k) {
       const glm::ivec3 a = t.vertices()[(k + 1) % 3], b = t.vertices()[(k + 2) % 3];
-      const int64_t inside = turn * (int64_t(b[u] - a[u]) * (centre[v] - a[v]) - int64_t(b[v] - a[v]) * (centre[u] - a[u]));
+      const int64_t inside =
+          turn * (int64_t(b[u] - a[u]) * (centre[v] - a[v]) - int64_t(b[v] - a[v]) * (centre[u] - a[u]));
       const int weight = shifted(std::clamp(inside, int64_t(0), whole), weightShift);
       sum += weight * vertexNormal(scene_.mesh->triangles[reference][int(k)]);
     }
@@ -169,7 +178,8 @@ class Voxeliser {
     }
     const uint32_t face = first->key & 7u, material = first->key >> 3;
     const int shift = bitsOf(std::max({std::abs(normal[0]), std::abs(normal[1]), std::abs(normal[2])})) - 20;
-    const glm::vec3 direction(float(shifted(normal[0], std::max(0, shift))), float(shifted(normal[1], std::max(0, shift))),
+    const glm::vec3 direction(float(shifted(normal[0], std::max(0, shift))),
+                              float(shifted(normal[1], std::max(0, shift))),
                               float(shifted(normal[2], std::max(0, shift))));
     return {shared::kTriangles | material << 16 | shared::packDirection(direction.x, direction.y, direction.z),
             shared::planeOf(face, u, v, h, reach)};

@@ -27,8 +27,9 @@ struct SceneBuffers : BrickLists {
   }
 };
 
-/// By the rule of docs/voxlink.md. Same bytes for any thread count, and the bytes that GlScene builds. Throws InputError
-/// if nothing is stored or there are more voxels or fragments than 32 bits can name. `degenerate`: triangles left out.
+/// By the rule of docs/voxlink.md. Same bytes for any thread count, and the bytes that GlScene builds. Throws
+/// InputError if nothing is stored or there are more voxels or fragments than 32 bits can name. `degenerate`: triangles
+/// left out.
 SceneBuffers buildSceneBuffers(const SceneVoxels& scene, int brickEdge, uint64_t& degenerate);
 
 }  // namespace freevoxel

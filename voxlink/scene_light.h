@@ -30,8 +30,8 @@ inline Placement placementOf(const SceneGrid& grid) {
   return placement;
 }
 
-/// Light is added up per pixel in whole numbers, whose order does not matter: multiples of 1 / scale, a power of two such
-/// that the brightest pixel that lamps can make fits.
+/// Light is added up per pixel in whole numbers, whose order does not matter: multiples of 1 / scale, a power of two
+/// such that the brightest pixel that lamps can make fits.
 float sumScale(const Lighting& lighting);
 /// Of the light that leaves the scene behind a pixel, which alpha lacks.
 inline constexpr float kEscapeScale = 16777216.0f;  // 2^24

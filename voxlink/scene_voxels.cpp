@@ -68,7 +68,8 @@ SurfaceMaterial surfaceMaterial(const Material& material) {
   return {c.r, c.g, c.b, material.opacity, material.reflectance, material.indexOfRefraction, kind, 0};
 }
 
-/// Value at a place in index space as a code: trilinear, of the outermost voxels beyond them; of the nearest for labels.
+/// Value at a place in index space as a code: trilinear, of the outermost voxels beyond them; of the nearest for
+/// labels.
 uint32_t codeAt(const ValueGrid& grid, bool labels, glm::dvec3 place) {
   glm::ivec3 low, high;
   glm::dvec3 weight;
@@ -116,8 +117,7 @@ void sampleVolume(const SceneVolume& volume, uint16_t index, double threshold, S
         if (outside) continue;
         const uint32_t code = codeAt(grid, labels, place);
         if (stored[code] == 0) continue;
-        const glm::ivec3 nearest =
-            glm::clamp(glm::ivec3(glm::floor(place + 0.5)), glm::ivec3(0), grid.dims - 1);
+        const glm::ivec3 nearest = glm::clamp(glm::ivec3(glm::floor(place + 0.5)), glm::ivec3(0), grid.dims - 1);
         slices[size_t(z - first.z)].push_back({{uint16_t(x), uint16_t(y), uint16_t(z)},
                                                index,
                                                shared::fragmentOf(code, voxelNormal(grid, gradientMatrix, nearest))});

@@ -51,9 +51,9 @@ struct SceneVoxels {
   const Mesh* mesh = nullptr;
   std::vector<SurfaceMaterial> materials;  ///< the mesh's, then the spheres'
   std::vector<SceneSphere> spheres;
-  std::vector<VolumeSample> samples;             ///< by volume and slice
-  std::vector<VoxelMaterial> volumeMaterials;    ///< of every code of every volume, extinction per voxel
-  std::vector<uint32_t> firstOfVolume;           ///< of its materials, one per volume
+  std::vector<VolumeSample> samples;           ///< by volume and slice
+  std::vector<VoxelMaterial> volumeMaterials;  ///< of every code of every volume, extinction per voxel
+  std::vector<uint32_t> firstOfVolume;         ///< of its materials, one per volume
 };
 
 /// Throws InputError for materials, indices or numbers that make no sense, and for more than can be named.

@@ -115,8 +115,8 @@ class SceneTracer {
       };
       if (kind == shared::kTriangles) {
         float t = 0.0f, leave = 0.0f;
-        if (!shared::meetPlane(fragment.body, vec3(entry - (dvec3(voxel) + 0.5)), direction, length, float(from - ray.start),
-                               ray.thrownBack, t, leave)) {
+        if (!shared::meetPlane(fragment.body, vec3(entry - (dvec3(voxel) + 0.5)), direction, length,
+                               float(from - ray.start), ray.thrownBack, t, leave)) {
           continue;
         }
         const vec3 outward = shared::planeNormal(fragment.body);
@@ -232,8 +232,8 @@ class SceneTracer {
       return;
     }
     const vec3 against = met.leaving ? -met.normal : met.normal;
-    const shared::Split split = shared::splitRay(material, met.material + 1, ray.through, direction, against, met.leaving,
-                                                 ray.inside, ray.depth >= tracing_.maxDepth);
+    const shared::Split split = shared::splitRay(material, met.material + 1, ray.through, direction, against,
+                                                 met.leaving, ray.inside, ray.depth >= tracing_.maxDepth);
     if (split.straight > 0.0f && split.mirrored > 0.0f) {
       SceneRay back = from(ray, met, split.back, true);
       back.through = split.mirrored;
@@ -351,7 +351,8 @@ std::vector<uint32_t> lightVolumes(const SceneBuffers& buffers, const SceneVoxel
   forEachVolumeFragment(buffers, [&](size_t fragment, glm::ivec3 voxel) {
     vec3 sum(lighting.ambient), normal;
     float surface = 0.0f;
-    shared::unpackNormal(shared::fragmentNormal(buffers.fragments[fragment].body), normal.x, normal.y, normal.z, surface);
+    shared::unpackNormal(shared::fragmentNormal(buffers.fragments[fragment].body), normal.x, normal.y, normal.z,
+                         surface);
     const vec3 place = vec3(voxel) + 0.5f;
     const vec3 toEye = orthographic ? eye : eye - place;
     const float eyeDistance = glm::length(toEye);

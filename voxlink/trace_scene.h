@@ -14,9 +14,9 @@
 
 namespace freevoxel {
 
-/// What of each lamp's light reaches the centre of each voxel that a volume fills, by a ray: lamp after lamp, a byte per
-/// fragment; empty without volumes. Surfaces on the way take what splitRay leaves for shadow rays. Same bytes for any
-/// thread count.
+/// What of each lamp's light reaches the centre of each voxel that a volume fills, by a ray: lamp after lamp, a byte
+/// per fragment; empty without volumes. Surfaces on the way take what splitRay leaves for shadow rays. Same bytes for
+/// any thread count.
 LightShares volumeShares(const SceneBuffers& buffers, const SceneVoxels& scene, const Lighting& lighting,
                          Shadows shadows);
 

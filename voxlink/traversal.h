@@ -11,7 +11,8 @@ namespace freevoxel {
 
 /// Walks the stored voxels that a ray passes, front to back. Voxel (i,j,k) fills the box from (i,j,k) to
 /// (i,j,k) + 1: `origin` is index space shifted by half a voxel. `direction` is in voxels per unit of length, not 0.
-/// Calls visit(number of the stored voxel, voxel, from, to) with positions along the ray, from >= `start`, until it returns false.
+/// Calls visit(number of the stored voxel, voxel, from, to) with positions along the ray, from >= `start`, until it
+/// returns false.
 ///
 /// Empty bricks are passed in one step, and so is the rest of a column, a list along z, without a filled voxel.
 template <class Visit>

@@ -12,9 +12,9 @@ namespace freevoxel {
 
 /// A triangle on the grid of 1/256 voxel: coordinates in subvoxels, 0 <= each <= 2^20 (4096 voxels).
 ///
-/// Closed triangles against closed boxes, by separating axes: the axes of the box, the triangle's normal, and in each of
-/// the three projections along an axis the normals of its edges. All in 64-bit integers: edges take 21 bits, the normal
-/// 42, its product with a distance 63 at most.
+/// Closed triangles against closed boxes, by separating axes: the axes of the box, the triangle's normal, and in each
+/// of the three projections along an axis the normals of its edges. All in 64-bit integers: edges take 21 bits, the
+/// normal 42, its product with a distance 63 at most.
 class SnappedTriangle {
  public:
   explicit SnappedTriangle(const std::array<glm::ivec3, 3>& vertices) : vertex_(vertices) {
@@ -22,9 +22,8 @@ class SnappedTriangle {
       low_[axis] = std::min({vertex_[0][axis], vertex_[1][axis], vertex_[2][axis]});
       high_[axis] = std::max({vertex_[0][axis], vertex_[1][axis], vertex_[2][axis]});
       const int u = (axis + 1) % 3, v = (axis + 2) % 3;
-      normal_[size_t(axis)] =
-          int64_t(vertex_[1][u] - vertex_[0][u]) * int64_t(vertex_[2][v] - vertex_[0][v]) -
-          int64_t(vertex_[1][v] - vertex_[0][v]) * int64_t(vertex_[2][u] - vertex_[0][u]);
+      normal_[size_t(axis)] = int64_t(vertex_[1][u] - vertex_[0][u]) * int64_t(vertex_[2][v] - vertex_[0][v]) -
+                              int64_t(vertex_[1][v] - vertex_[0][v]) * int64_t(vertex_[2][u] - vertex_[0][u]);
     }
     for (int axis = 1; axis < 3; ++axis) {
       if (magnitude(normal_[size_t(axis)]) > magnitude(normal_[size_t(axis_)])) axis_ = axis;

@@ -1,5 +1,6 @@
-// Packs directions to 16 bits, polar, by + - * and comparisons alone, so that every backend packs alike. Whoever includes
-// this defines DIRECTION_TABLE(i), entry i of a table of kDirectionTable numbers (voxlink/direction_code.h fills it).
+// Packs directions to 16 bits, polar, by + - * and comparisons alone, so that every backend packs alike. Whoever
+// includes this defines DIRECTION_TABLE(i), entry i of a table of kDirectionTable numbers (voxlink/direction_code.h
+// fills it).
 #ifndef FREEVOXEL_SHADERS_SHARED_DIRECTION_CODE_H
 #define FREEVOXEL_SHADERS_SHARED_DIRECTION_CODE_H
 

@@ -21,8 +21,8 @@
 FREEVOXEL_BEGIN_SHARED
 
 #ifdef __cplusplus
-using glm::vec3;
 using glm::dot;
+using glm::vec3;
 using std::floor;
 using std::sqrt;
 #endif
@@ -106,8 +106,8 @@ SHARED_CONSTANT int kPackedHeight = 52;  // a step of height: |height| <= 1.5 vo
 SHARED_CONSTANT int kPackedReach = 256;  // a step of reach: 1/16 voxel; 31 steps stand for the whole voxel
 
 // The plane of one triangle in one voxel. `along`, `across`: components of the triangle's normal, shifted such that
-// `along`, of its axis, has 15 bits; `above`: the normal's product with the way from the voxel's centre to the triangle,
-// in subvoxels, shifted alike.
+// `along`, of its axis, has 15 bits; `above`: the normal's product with the way from the voxel's centre to the
+// triangle, in subvoxels, shifted alike.
 SHARED_FUNCTION int slopeOf(int across, int along) {
   return along < 0 ? quotient(across * kSlopeOne, -along) : quotient(-across * kSlopeOne, along);
 }
@@ -202,16 +202,16 @@ SHARED_CONSTANT uint kShadowRay = 1u << 31;
 SHARED_CONSTANT uint kThrownBack = 1u << 30;
 SHARED_CONSTANT uint kDepthBits = 0xffu;
 
-// What a pass over rays is about to do, and has done. Rays that wait lie on a stack; a pass takes rays from its top, and
-// pixels that have not had theirs, as many as leave room for all that may come of them.
+// What a pass over rays is about to do, and has done. Rays that wait lie on a stack; a pass takes rays from its top,
+// and pixels that have not had theirs, as many as leave room for all that may come of them.
 struct RayControl {
-  uint waiting;     // on the stack
-  uint nextPixel;   // in tiles of 8 x 8
-  uint fromStack;   // of this pass
-  uint fromPixels;  // of this pass
-  uint firstPixel;  // of this pass
-  uint born;        // rays, during this pass
-  uint rays, raysHigh;  // before it: 2^32 raysHigh + rays
+  uint waiting;                      // on the stack
+  uint nextPixel;                    // in tiles of 8 x 8
+  uint fromStack;                    // of this pass
+  uint fromPixels;                   // of this pass
+  uint firstPixel;                   // of this pass
+  uint born;                         // rays, during this pass
+  uint rays, raysHigh;               // before it: 2^32 raysHigh + rays
   uint copyGroups, copyY, copyZ;     // of the pass that takes rays off the stack
   uint traceGroups, traceY, traceZ;  // of the pass that traces
   uint passes;
@@ -301,11 +301,11 @@ SHARED_FUNCTION bool refracted(vec3 direction, vec3 normal, float ratio, SHARED_
 // What a ray does at a surface once it has its colour (papers/voxlink section 5.2.1): `through` is what is left behind
 // the surface, 1 - alpha'; the shares of both rays add up to it.
 struct Split {
-  float straight;   // goes on, the way it came or refracted
-  float mirrored;   // is reflected
-  vec3 onward;      // direction of the ray that goes on
-  vec3 back;        // direction of the reflected one
-  uint inside;      // of the ray that goes on
+  float straight;  // goes on, the way it came or refracted
+  float mirrored;  // is reflected
+  vec3 onward;     // direction of the ray that goes on
+  vec3 back;       // direction of the reflected one
+  uint inside;     // of the ray that goes on
 };
 // `normal` against the direction. `leaving`: the surface is met from inside. A ray that may not be bent any more
 // (`exhausted`) goes straight on through glass, and ends at a mirror.

@@ -9,8 +9,8 @@
 
 namespace freevoxel::test {
 
-inline uint32_t addMaterial(Mesh& mesh, glm::vec3 linear, MaterialKind kind = MaterialKind::diffuse, float opacity = 1.0f,
-                            float reflectance = 0.1f, float index = 1.5f) {
+inline uint32_t addMaterial(Mesh& mesh, glm::vec3 linear, MaterialKind kind = MaterialKind::diffuse,
+                            float opacity = 1.0f, float reflectance = 0.1f, float index = 1.5f) {
   mesh.materials.push_back({"", kind, linear, opacity, reflectance, index});
   return uint32_t(mesh.materials.size() - 1);
 }
