@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <glm/glm.hpp>
+#include <optional>
 
 #include "base/compare.h"
 #include "base/error.h"
+#include "shaders/shared/scene_voxel.h"
 #include "tests/support/test_data.h"
 #include "tests/voxlink/surface_scenes.h"
 #include "voxlink/scene.h"
