@@ -94,6 +94,10 @@ nlohmann::ordered_json describe(const AttenuationFile& file, Histogram& histogra
   json["classification"] = classificationName(file.classification());
   json["levels"] = file.levels();
   json["bricks"] = file.brickCount();
+  json["pins"] = nlohmann::ordered_json::array();
+  for (const Pin& pin : file.pinned().pins())
+    json["pins"].push_back({{pin.directional ? "direction" : "position", triple(pin.world)}});
+  json["pinBytes"] = file.pinned().bytes();
   json["storedVoxels"] = file.storedVoxels();
   const auto per = [](uint64_t bytes, uint64_t voxels) { return voxels > 0 ? double(bytes) / double(voxels) : 0.0; };
   const uint64_t voxels = voxelCount(file.dims());
@@ -242,7 +246,8 @@ Command addInfo(CLI::App& program, CommonOptions& common) {
       "--json", options->json,
       "print JSON: dims, spacing, origin, direction (of each axis), bounds (world), type, range, sum, "
       "nonFinite, fileBytes; for an attenuation "
-      "file also layout, classification, levels, bricks, storedVoxels, occupancy (their share), "
+      "file also layout, classification, levels, bricks, pins (each a direction or a position, world), pinBytes, "
+      "storedVoxels, occupancy (their share), "
       "valueBytes, attenuationBytes, and both per voxel of the volume (...PerVoxel) and per stored voxel "
       "(...PerStoredVoxel) (there sum is over stored voxels); of meshes and spheres what is in them, what "
       "was left out, and the first 64 materials");

@@ -6,10 +6,14 @@
 #include <algorithm>
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "app/command.h"
 #include "app/parse.h"
 #include "app/precompute_report.h"
+#include "base/atomic_file.h"
+#include "base/error.h"
+#include "splat/pinned_attenuation.h"
 #include "volume/read_volume.h"
 #include "volume/transfer_presets.h"
 
@@ -21,6 +25,7 @@ struct PrecomputeCommandOptions {
   std::string input, output, transfer;
   VolumeOptions raw;
   std::optional<uint64_t> memory;
+  std::vector<Pin> pins;
   PrecomputeOptions precompute;
 };
 
@@ -43,6 +48,58 @@ Classification labelClassification(const PrecomputeCommandOptions& options, cons
   return Classification::voxel;
 }
 
+/// One word of --pin-light or --pin-direction.
+Pin parsePin(std::string_view text, bool directional) {
+  const Pin pin{directional, parseTriple(text)};
+  if (directional && pin.world == glm::dvec3(0.0)) throw UsageError("a direction must not be 0,0,0");
+  return pin;
+}
+
+void addPinOption(CLI::App& command, const std::string& name, std::vector<Pin>& pins, bool directional,
+                  const std::string& description) {
+  const auto read = [&pins, name, directional](const std::vector<std::string>& texts) {
+    for (const std::string& text : texts) {
+      try {
+        pins.push_back(parsePin(text, directional));
+      } catch (const UsageError& error) {
+        throw UsageError(name + ": " + error.what());
+      }
+    }
+  };
+  command.add_option_function<std::vector<std::string>>(name, read, description)
+      ->type_name("X,Y,Z")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+}
+
+/// Throws MachineError if pins need more memory than is allowed: a sweep has the whole volume before it.
+void checkPinMemory(const PrecomputeCommandOptions& options, const VolumeHeader& header) {
+  const uint64_t needed = pinMemory(header.voxels());
+  if (options.pins.empty() || options.precompute.memoryBytes == 0 || needed <= options.precompute.memoryBytes) return;
+  throw MachineError(
+      fmt::format("{}: pins need {} bytes of memory for this volume, {} are allowed; try more, or no pins",
+                  options.output, needed, options.precompute.memoryBytes));
+}
+
+/// The attenuation file, with pins if there are any. `Source` is a Volume or a VolumeSource.
+template <class Source>
+void makeFile(Source& source, const TransferFunction& transfer, const PrecomputeCommandOptions& options,
+              Session& session) {
+  if (options.pins.empty()) {
+    reportPrecompute(precompute(source, transfer, options.output, options.precompute, session.progress()), session);
+    return;
+  }
+  // Never committed, so it goes when this function ends.
+  const AtomicFile scratch(options.output + ".unpinned.fvx");
+  PrecomputeResult result =
+      precompute(source, transfer, scratch.temporaryPath(), options.precompute, session.progress());
+  result.fileBytes = session.timed("pins", [&] {
+    return pinAttenuation(scratch.temporaryPath(), options.pins, options.output, session.progress());
+  });
+  reportPrecompute(result, session);
+  session.statistics["pins"] = options.pins.size();
+}
+
 Outcome precomputeCommand(PrecomputeCommandOptions options, const CLI::App& command, Session& session) {
   options.precompute.command = session.command();
   const auto classify = [&](const TransferFunction& transfer) {
@@ -53,13 +110,14 @@ Outcome precomputeCommand(PrecomputeCommandOptions options, const CLI::App& comm
     const auto source = openVolume(options.input, options.raw);
     const TransferFunction transfer = chooseTransfer(options.transfer, source->header());
     classify(transfer);
-    reportPrecompute(precompute(*source, transfer, options.output, options.precompute, session.progress()), session);
+    checkPinMemory(options, source->header());
+    makeFile(*source, transfer, options, session);
     return Outcome::done;
   }
   const Volume volume = session.timed("read", [&] { return readVolume(options.input, options.raw); });
   const TransferFunction transfer = chooseTransfer(options.transfer, volume);
   classify(transfer);
-  reportPrecompute(precompute(volume, transfer, options.output, options.precompute, session.progress()), session);
+  makeFile(volume, transfer, options, session);
   return Outcome::done;
 }
 
@@ -111,6 +169,13 @@ Command addPrecompute(CLI::App& program, CommonOptions& common) {
       "take no more memory than this, 64M or more, for the whole run: the volume is read in slices, and its codes "
       "wait on the disk beside the output; K, M and G are powers of 1024 (default: the volume is held in memory)",
       parseMemory);
+  addPinOption(
+      *command, "--pin-light", options->pins, false,
+      "also store attenuation swept towards a point of world space: of a lamp that stays there, or an eye; may "
+      "be given again");
+  addPinOption(*command, "--pin-direction", options->pins, true,
+               "also store attenuation swept towards a direction: of a lamp far away, or parallel rays; may be given "
+               "again");
   addVolumeOptions(*command, options->raw);
   addCommonOptions(*command, common);
   return {command, [options, command](Session& session) { return precomputeCommand(*options, *command, session); }};

@@ -338,19 +338,18 @@ Command addRender(CLI::App& program, CommonOptions& common) {
                        {{"cell", Footprint::cell}, {"kernel", Footprint::kernel}},
                        "what a splat covers: cells between voxels, or the paper's kernels round voxels (default for "
                        "formula paper)");
-  const std::vector<std::pair<std::string, AttenuationSource>> sources = {{"auto", AttenuationSource::automatic},
-                                                                          {"stored", AttenuationSource::stored},
-                                                                          {"corrected", AttenuationSource::corrected},
-                                                                          {"swept", AttenuationSource::swept},
-                                                                          {"quotient", AttenuationSource::quotient}};
+  const std::vector<std::pair<std::string, AttenuationSource>> sources = {
+      {"auto", AttenuationSource::automatic},      {"stored", AttenuationSource::stored},
+      {"corrected", AttenuationSource::corrected}, {"swept", AttenuationSource::swept},
+      {"pinned", AttenuationSource::pinned},       {"quotient", AttenuationSource::quotient}};
   addChoice<AttenuationSource>(*command, "--attenuation", options->splat.attenuation, sources,
                                "what light loses on its way to the eye: from the file's 26 directions, from these "
-                               "corrected by a coarse sweep, swept for this eye, or from the 26 with the paper's "
-                               "quotient for an eye inside the volume; auto takes corrected with an attenuation file "
-                               "and the eye outside, else swept");
+                               "corrected by a coarse sweep, swept for this eye, pinned in the file, or from the 26 "
+                               "with the paper's quotient for an eye inside the volume; auto takes a pin that is the "
+                               "eye, else corrected with an attenuation file and the eye outside, else swept");
   addChoice<AttenuationSource>(*command, "--light-attenuation", options->splat.lightAttenuation, sources,
-                               "the same for light on its way from the lamps; auto takes stored with an attenuation "
-                               "file and the lamp outside, else swept");
+                               "the same for light on its way from the lamps; auto takes a pin that is the lamp, else "
+                               "stored with an attenuation file and the lamp outside, else swept");
   addChoice<Cull>(*command, "--cull", options->splat.cull, {{"none", Cull::none}, {"hidden", Cull::hidden}},
                   "leave out what hardly any light reaches the eye from");
   addChoice<Backend>(*command, "--backend", options->backend,

@@ -63,8 +63,9 @@ bool isAmong(std::span<const SectionType> types, const SectionType& type) {
 }
 
 bool isKnown(const SectionType& type) {
-  constexpr SectionType kOthers[] = {section::kMetadata, section::kTransfer, section::kDirections,
-                                     section::kBricks,   section::kFrames,   section::kCommand};
+  constexpr SectionType kOthers[] = {section::kMetadata, section::kTransfer,  section::kDirections,
+                                     section::kBricks,   section::kFrames,    section::kCommand,
+                                     section::kPins,     section::kPinFrames, section::kPackedPins};
   return isAmong(kOthers, type) || isAmong(kDenseBricks, type) || isAmong(kCompactBricks, type);
 }
 
@@ -96,6 +97,7 @@ AttenuationFile::AttenuationFile(const std::string& path) : path_(path), map_(pa
   readTransfer();
   readDirections();
   readBricks();
+  readPins();
   checkIntact();
 }
 
@@ -328,6 +330,22 @@ void AttenuationFile::readBricks() {
   }
 }
 
+void AttenuationFile::readPins() {
+  if (find(section::kPins) == nullptr && find(section::kPinFrames) == nullptr && find(section::kPackedPins) == nullptr)
+    return;
+  PinSections sections;
+  const auto take = [&](SectionType type, PinSections::Section& to) {
+    const SectionEntry& entry = required(type);
+    to = {content(entry), entry.offset, entry.items};
+    // As of other brick data, the frames' checksum is for verify().
+    if (type != section::kPackedPins) verifySection(entry);
+  };
+  take(section::kPins, sections.pins);
+  take(section::kPinFrames, sections.directory);
+  take(section::kPackedPins, sections.frames);
+  pinned_ = PinnedPlanes(path_, sections, dims(), brickEdge());
+}
+
 void AttenuationFile::readFrames() {
   const SectionEntry& entry = required(section::kFrames);
   checkBrickSection(section::kFrames, sizeof(FrameEntry));
@@ -531,6 +549,7 @@ void AttenuationFile::verify() const {
     verifyHash(required(brickSections()[which]), brickSectionHash(bricks_, kBrickHashes[which]));
   for (size_t i = 0; i < bricks_.size(); ++i)
     verifyBrick(i);
+  pinned_.verify();
   checkIntact();
 }
 

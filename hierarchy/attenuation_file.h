@@ -13,6 +13,7 @@
 #include "base/mapped_file.h"
 #include "base/placement.h"
 #include "hierarchy/brick_regeneration.h"
+#include "hierarchy/pinned_planes.h"
 #include "precompute/format.h"
 #include "precompute/hilbert.h"
 #include "volume/transfer_function.h"
@@ -68,6 +69,9 @@ class AttenuationFile {
   uint64_t identity() const { return hash_; }  ///< a hash of the whole file, as its header has it
   std::string command() const;                 ///< that made the file; empty if not recorded
 
+  /// What attenuation was swept towards when the file was made.
+  const PinnedPlanes& pinned() const { return pinned_; }
+
   size_t brickCount() const { return bricks_.size(); }  ///< stored bricks, sorted along the Hilbert curve
   glm::ivec3 brickOrigin(size_t i) const;               ///< its first voxel
   /// Codes and the attenuation along `directions`. Layout compact unpacks them here, at a cost for every direction.
@@ -96,6 +100,7 @@ class AttenuationFile {
   void readTransfer();
   void readDirections();
   void readBricks();
+  void readPins();
   void verifyHash(const SectionEntry& entry, uint64_t hash) const;
   void verifySection(const SectionEntry& entry) const;
   void readFrames();
@@ -130,6 +135,7 @@ class AttenuationFile {
   std::vector<FrameEntry> frames_;  ///< of layout compact
   std::array<std::span<const std::byte>, 3> brickData_;
   std::unique_ptr<const BrickRegeneration> regeneration_;  ///< of layout compact
+  PinnedPlanes pinned_;
 };
 
 }  // namespace freevoxel

@@ -2,7 +2,7 @@
 
 #include <xxhash.h>
 
-#include <cstring>
+#include <new>
 #include <vector>
 
 namespace freevoxel {
@@ -17,6 +17,26 @@ uint64_t headerHash(const FileHeader& header, std::span<const SectionEntry> sect
 
 uint64_t contentHash(std::span<const std::byte> bytes) {
   return XXH3_64bits(bytes.data(), bytes.size());
+}
+
+struct ContentHash::State {
+  XXH3_state_t* hash = XXH3_createState();
+  ~State() { XXH3_freeState(hash); }
+};
+
+ContentHash::ContentHash() : state_(std::make_unique<State>()) {
+  if (state_->hash == nullptr) throw std::bad_alloc();
+  XXH3_64bits_reset(state_->hash);
+}
+
+ContentHash::~ContentHash() = default;
+
+void ContentHash::add(std::span<const std::byte> bytes) {
+  XXH3_64bits_update(state_->hash, bytes.data(), bytes.size());
+}
+
+uint64_t ContentHash::value() const {
+  return XXH3_64bits_digest(state_->hash);
 }
 
 uint64_t brickSectionHash(std::span<const BrickEntry> bricks, uint64_t BrickEntry::*hash) {

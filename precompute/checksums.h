@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 
 #include "precompute/format.h"
@@ -14,6 +15,21 @@ uint64_t headerHash(const FileHeader& header, std::span<const SectionEntry> sect
 
 /// Of some bytes: SectionEntry::hash of most sections, and the hashes in a BrickEntry.
 uint64_t contentHash(std::span<const std::byte> bytes);
+
+/// The same of bytes that come in pieces.
+class ContentHash {
+ public:
+  ContentHash();
+  ~ContentHash();
+  ContentHash(const ContentHash&) = delete;
+  ContentHash& operator=(const ContentHash&) = delete;
+  void add(std::span<const std::byte> bytes);
+  uint64_t value() const;  ///< of all bytes so far
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
 
 /// SectionEntry::hash of a section whose bricks have a hash each, the member `hash` of their entries. So neither
 /// writing nor checking a file reads brick data twice.

@@ -51,6 +51,16 @@
 //            12      4  zero
 //            16     24  XXH3-64 of the brick's bytes in CODE, in ATTB and in ATTF; in ZCOD, in ZFCB and in ZFCF
 //   CMND  bytes  the command that made the file, UTF-8 text; may be skipped
+//   PINS   pins  what attenuation is pinned towards, PinEntry (pins.h); may be skipped with PFRM and ZPIN
+//             0      4  kind: 0 a direction, 1 a position
+//             4      4  zero
+//             8     24  x y z in world space, f64; a direction of any length but 0
+//   PFRM     p b  where the frames of the p pins lie, PinFrameEntry: pin by pin, for each of the b bricks of the
+//                 volume, stored or not, x fastest
+//             0      4  bytes in ZPIN; 0: attenuation is the same all over the brick
+//             4      4  then that attenuation; else zero
+//   ZPIN   pins  frames (brick_frames.h) of round(65535 A) along the curve, as codes of two bytes, in the order of PFRM
+//                without gap; 65535 outside the volume
 //
 // Layout dense has
 //   CODE  bricks value codes: E^3 of b bytes each along the Hilbert curve; 0 outside the volume
@@ -137,6 +147,9 @@ inline constexpr SectionType kPackedCodes = {'Z', 'C', 'O', 'D'};
 inline constexpr SectionType kPackedBackward = {'Z', 'F', 'C', 'B'};
 inline constexpr SectionType kPackedForward = {'Z', 'F', 'C', 'F'};
 inline constexpr SectionType kCommand = {'C', 'M', 'N', 'D'};
+inline constexpr SectionType kPins = {'P', 'I', 'N', 'S'};
+inline constexpr SectionType kPinFrames = {'P', 'F', 'R', 'M'};
+inline constexpr SectionType kPackedPins = {'Z', 'P', 'I', 'N'};
 }  // namespace section
 
 inline constexpr uint32_t kSectionOptional = 1;  ///< SectionEntry::flags

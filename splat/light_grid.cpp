@@ -13,9 +13,10 @@ namespace {
 /// Lights some voxels at a time.
 class Lamps {
  public:
-  Lamps(const ValueGrid& grid, const Lighting& lighting, const Camera& camera,
+  Lamps(const ValueGrid& grid, const AttenuationFile* file, const Lighting& lighting, const Camera& camera,
         std::span<const LampAttenuation> attenuations, LightGrid& result)
       : grid_(grid),
+        file_(file),
         lighting_(lighting),
         camera_(camera),
         attenuations_(attenuations),
@@ -41,6 +42,11 @@ class Lamps {
       const LampAttenuation& attenuation = attenuations_[lamp];
       if (attenuation.stored) {
         attenuation.stored->look(*brick, passed);
+      } else if (attenuation.pin) {
+        std::vector<uint16_t> pinned(voxels.size());
+        file_->pinned().unpack(*attenuation.pin, brick->origin / brick->edge, pinned);
+        for (size_t i = 0; i < voxels.size(); ++i)
+          passed[i] = float(pinned[i]) * (1.0f / AttenuationGrid::kUnit);
       } else {
         for (size_t i = 0; i < voxels.size(); ++i) {
           if (!outside(voxels[i]))
@@ -100,6 +106,7 @@ class Lamps {
   }
 
   const ValueGrid& grid_;
+  const AttenuationFile* file_;
   const Lighting& lighting_;
   const Camera& camera_;
   std::span<const LampAttenuation> attenuations_;
@@ -127,7 +134,7 @@ LightGrid lightGrid(const ValueGrid& grid, const VisibleCubes& cubes, const Atte
     result.scale = 1.0f;
     return result;
   }
-  const Lamps lamps(grid, lighting, camera, attenuations, result);
+  const Lamps lamps(grid, file, lighting, camera, attenuations, result);
   if (file != nullptr) {
     const auto lightBrick = [&](size_t b) {
       DirectionSet directions = 0;

@@ -29,15 +29,16 @@ struct LightGrid {
   bool empty() const { return values.empty(); }
 };
 
-/// What the volume lets through towards one lamp: looked up in the attenuation file, or a whole grid.
+/// What the volume lets through towards one lamp: looked up in the attenuation file, a pin of it, or a whole grid.
 struct LampAttenuation {
   std::optional<StoredAttenuation> stored;
-  AttenuationGrid grid;  ///< if not `stored`
+  std::optional<size_t> pin;
+  AttenuationGrid grid;  ///< if neither
 };
 
 /// Ambient light, and every lamp's times what the volume lets through to the voxel times its shading, in one pass over
 /// the voxels that a visible cell touches (what other voxels get does not matter). `attenuations`: one per lamp. `file`
-/// may be null if none of them is `stored`. Empty if the lighting is Lighting::unlit().
+/// may be null if all of them are grids. Empty if the lighting is Lighting::unlit().
 LightGrid lightGrid(const ValueGrid& grid, const VisibleCubes& cubes, const AttenuationFile* file,
                     const Lighting& lighting, const Camera& camera, std::span<const LampAttenuation> attenuations);
 

@@ -17,6 +17,7 @@
 #include "splat/draw_cells.h"
 #include "splat/draw_kernels.h"
 #include "splat/kernel_splats.h"
+#include "splat/pinned_attenuation.h"
 
 namespace freevoxel {
 
@@ -100,6 +101,8 @@ std::string_view attenuationSourceName(AttenuationSource source) {
       return "corrected";
     case AttenuationSource::swept:
       return "swept";
+    case AttenuationSource::pinned:
+      return "pinned";
     case AttenuationSource::quotient:
       return "quotient";
   }
@@ -173,6 +176,7 @@ Splatter::Splatter(Splatter&& other) noexcept = default;
 
 AttenuationSource Splatter::State::chosen(AttenuationSource source, const Towards& target, bool lamp) const {
   if (source == AttenuationSource::automatic) {
+    if (file != nullptr && findPin(*file, target)) return AttenuationSource::pinned;
     // What is stored runs on to the outside, past a target inside the volume.
     if (file == nullptr || target.inside(grid.dims)) return AttenuationSource::swept;
     return lamp ? AttenuationSource::stored : AttenuationSource::corrected;
@@ -181,11 +185,19 @@ AttenuationSource Splatter::State::chosen(AttenuationSource source, const Toward
     throw InputError(fmt::format("{} attenuation needs an attenuation file; make one with freevoxel precompute",
                                  attenuationSourceName(source)));
   }
+  if (source == AttenuationSource::pinned && !findPin(*file, target)) {
+    throw InputError(fmt::format(
+        "{}: has no pin for {}; of its {} pins freevoxel info tells where they are, and freevoxel precompute "
+        "{} adds this one",
+        file->path(), lamp ? "a lamp of the picture" : "the eye", file->pinned().pins().size(),
+        target.directional ? "--pin-direction" : "--pin-light"));
+  }
   return source;
 }
 
 AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, AttenuationSource source) {
   if (source == AttenuationSource::swept) return sweptAttenuation(grid, table, cubes, target);
+  if (source == AttenuationSource::pinned) return pinnedAttenuation(*file, findPin(*file, target).value());
   AttenuationGrid result = storedAttenuation(
       *file, target, source == AttenuationSource::quotient ? StoredLookup::quotient : StoredLookup::interpolated);
   if (source == AttenuationSource::corrected) {
@@ -206,6 +218,8 @@ void Splatter::State::lightVoxels(const Camera& camera, const SplatOptions& opti
     if (source == AttenuationSource::stored || source == AttenuationSource::quotient) {
       attenuation.stored.emplace(
           *file, target, source == AttenuationSource::quotient ? StoredLookup::quotient : StoredLookup::interpolated);
+    } else if (source == AttenuationSource::pinned) {
+      attenuation.pin = findPin(*file, target);
     } else {
       attenuation.grid = attenuationTowards(target, source);
     }
@@ -233,7 +247,8 @@ Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, c
   cells.inverseQuantum = 1.0f / quantum;
   // Stored attenuation, corrected or not, is too rough to end a ray.
   const bool endRays =
-      options.cull == Cull::hidden && statistics.attenuation == attenuationSourceName(AttenuationSource::swept);
+      options.cull == Cull::hidden && (statistics.attenuation == attenuationSourceName(AttenuationSource::swept) ||
+                                       statistics.attenuation == attenuationSourceName(AttenuationSource::pinned));
   cells.hiddenBelow = endRays ? kHiddenBelow : 0.0f;
   const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, share, statistics);
   statistics.setupSeconds += secondsSince(setupStart);

@@ -29,11 +29,12 @@ enum class Footprint {
 
 /// Where attenuation towards the eye, or towards a lamp, comes from.
 enum class AttenuationSource {
-  automatic,  ///< with an attenuation file, and the target outside the volume: `corrected` for the eye and `stored` for
-              ///< lamps; else swept
+  automatic,  ///< pinned, if the file has a pin that is the target; else with an attenuation file, and the target
+              ///< outside the volume: `corrected` for the eye and `stored` for lamps; else swept
   stored,     ///< the 26 directions of the file, which run on to the outside even if the target is inside
   corrected,  ///< stored, corrected by a sweep of a coarse copy of the volume
   swept,      ///< one sweep over the values for this target
+  pinned,     ///< a sweep for this target that the file holds: the bits that `swept` gives
   quotient,   ///< stored, divided by the same at the target's own voxel: the paper's A_B / A_V for an eye inside
 };
 
@@ -73,7 +74,7 @@ struct SplatStatistics {
   std::string backend;           ///< "gl" or "cpu"
   std::string glRenderer;        ///< empty for cpu
   std::string attenuation;       ///< towards the eye: name of the source
-  std::string lightAttenuation;  ///< the same towards lamps; empty without any
+  std::string lightAttenuation;  ///< the same towards lamps, of the last one; empty without any
   double attenuationSeconds = 0, lightSeconds = 0, setupSeconds = 0, drawSeconds = 0;
 };
 
