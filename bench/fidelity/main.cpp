@@ -45,6 +45,10 @@ std::string measure(const Options& options) {
     return fmt::format("Against the post-classified reference:\n\n{}\nAgainst the pre-classified reference:\n\n{}",
                        tables.post.markdown(), tables.pre.markdown());
   }
+  if (options.what == "references") {
+    forEachScene(options, [&](const Scene& scene) { castReferences(scene, options.tables); });
+    return {};
+  }
   const std::pair<const char*, void (*)(Table&, const Scene&, const TableOptions&)> simple[] = {
       {"shadows", addShadows}, {"inside", addInside}, {"hidden", addHidden}, {"lights", addLights}};
   for (const auto& [name, add] : simple) {
@@ -60,13 +64,14 @@ int run(int argc, char** argv) {
   CLI::App app("measures the fidelity of freevoxel's pictures");
   Options options;
   int size = options.tables.imageSize.x;
-  app.add_option("TABLE", options.what, "what to measure; figures: what to draw")
+  app.add_option("TABLE", options.what, "what to measure; figures: what to draw; references: casts those of quality")
       ->required()
-      ->check(CLI::IsMember({"quality", "shadows", "inside", "hidden", "lights", "figures"}));
+      ->check(CLI::IsMember({"quality", "shadows", "inside", "hidden", "lights", "figures", "references"}));
   app.add_option("--data", options.tables.folders.data, "folder with the real volumes")->required();
   app.add_option("--transfers", options.tables.folders.transfers, "examples/transfer")->required();
   app.add_option("--cache", options.tables.folders.cache, "folder for references and attenuation files")->required();
   app.add_option("--columns", options.columns, "only these volumes")->delimiter(',');
+  app.add_option("--rows", options.tables.rows, "of quality: only rows whose name holds one of these")->delimiter(',');
   app.add_option("--views", options.tables.views, "random views")->check(CLI::Range(1, 1000))->capture_default_str();
   app.add_option("--size", size, "pictures are as many pixels wide and high")
       ->check(CLI::Range(16, 4096))
@@ -81,6 +86,7 @@ int run(int argc, char** argv) {
     return 0;
   }
   const std::string text = measure(options);
+  if (text.empty()) return 0;
   if (options.output.empty()) {
     fmt::print("{}", text);
   } else {

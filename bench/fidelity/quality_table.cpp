@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "base/progress.h"
@@ -31,7 +32,7 @@ SplatOptions splats(Formula formula, Footprint footprint, AttenuationSource sour
   return options;
 }
 
-std::vector<Row> qualityRows() {
+std::vector<Row> allRows() {
   constexpr Footprint kKernel = Footprint::kernel, kCell = Footprint::cell;
   constexpr AttenuationSource kSources[] = {AttenuationSource::stored, AttenuationSource::corrected,
                                             AttenuationSource::swept};
@@ -60,16 +61,45 @@ std::vector<Row> qualityRows() {
   return rows;
 }
 
+std::vector<Row> qualityRows(const std::vector<std::string>& wanted) {
+  std::vector<Row> rows = allRows();
+  const auto isWanted = [&](const Row& row) {
+    return wanted.empty() || std::any_of(wanted.begin(), wanted.end(), [&](const std::string& part) {
+             return row.name.find(part) != std::string::npos;
+           });
+  };
+  rows.erase(std::remove_if(rows.begin(), rows.end(), [&](const Row& row) { return !isWanted(row); }), rows.end());
+  return rows;
+}
+
 Image pictureOf(const Row& row, Splatter& splatter, const Scene& scene, const Camera& view, const Folders& folders) {
   if (row.splats) return resolve(splatter.render(view, *row.splats, silentProgress()).sums, row.splats->formula);
   if (row.blended) return splatter.renderBlended(view, *row.blended, {}, silentProgress()).image;
   return reference(scene, view, row.raycast, folders);
 }
 
+RaycastOptions converged(RaycastClassification classification) {
+  RaycastOptions options;
+  options.classification = classification;
+  options.step = kConvergedStep;
+  return options;
+}
+
 }  // namespace
 
+void castReferences(const Scene& scene, const TableOptions& options) {
+  RaycastOptions coarse;
+  coarse.step = 1.0;
+  for (const Camera& view : randomViews(scene.bounds(), options.views, options.imageSize)) {
+    for (const RaycastOptions& how :
+         {converged(RaycastClassification::post), converged(RaycastClassification::pre), coarse}) {
+      reference(scene, view, how, options.folders);
+    }
+  }
+}
+
 void addQuality(QualityTables& tables, const Scene& scene, const TableOptions& options) {
-  const std::vector<Row> rows = qualityRows();
+  const std::vector<Row> rows = qualityRows(options.rows);
   for (Table* table : {&tables.post, &tables.pre}) {
     if (table->head.empty()) {
       table->head = {""};
@@ -79,9 +109,7 @@ void addQuality(QualityTables& tables, const Scene& scene, const TableOptions& o
     table->head.push_back(scene.source.title);
   }
   const std::vector<Camera> views = randomViews(scene.bounds(), options.views, options.imageSize);
-  RaycastOptions post, pre;
-  post.step = pre.step = kConvergedStep;
-  pre.classification = RaycastClassification::pre;
+  const RaycastOptions post = converged(RaycastClassification::post), pre = converged(RaycastClassification::pre);
   std::vector<Image> postReferences, preReferences;
   for (const Camera& view : views) {
     postReferences.push_back(reference(scene, view, post, options.folders));

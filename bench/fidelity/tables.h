@@ -12,7 +12,11 @@ struct TableOptions {
   Folders folders;
   int views = 20;
   glm::ivec2 imageSize{512, 512};
+  std::vector<std::string> rows;  ///< of quality: only those whose name holds one of these; all if empty
 };
+
+/// Casts what addQuality compares with, as far as the cache lacks it.
+void castReferences(const Scene& scene, const TableOptions& options);
 
 /// PSNR against the post-classified and the pre-classified reference, of every formula, footprint and source of
 /// attenuation: a column.

@@ -3,7 +3,8 @@
 // The ray is cut by the planes of voxels across its dominant axis; a piece between two planes belongs to the block that
 // holds its end at the lower plane, so blocks tile every ray. Pieces are halved, the value is interpolated at the cuts
 // and classified after that by integrals over it, and the pieces of a block are composited front to back. What lies
-// before the block comes in by one factor: attenuation towards the eye, interpolated where the ray enters the block.
+// before the block comes in by one factor: attenuation towards the eye, interpolated where the ray comes to the first
+// visible piece of the block. Up to there the block itself takes nothing, and there the voxels around are stored ones.
 // Nothing here depends on another block, so blocks add in any order.
 //
 // The file that includes this one defines BLOCK_ACCESS, a parameter (with comma) that functions hand on as
@@ -204,7 +205,10 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay ray, CellLayout layout_
   EXACT float emission = 0.0f;
   EXACT float depth = 0.0f;
   EXACT float arriving = 0.0f;  // attenuation at the entry, times what the block itself has let through since
-  bool entered = false;
+  bool inside = false;          // whether the ray has come to a piece of the block
+  bool open = false;            // whether nothing lies before the first of them
+  bool entered = false;         // whether it has come to something visible
+  bool hidden = false;
   bool eyeAbove = (ray.axisAndSide & kRayEyeAbove) != 0u;
   EXACT float before = 0.0f;  // value at the end of the piece just done
   bool haveBefore = false;
@@ -224,14 +228,12 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay ray, CellLayout layout_
     EXACT float nearEnd = eyeAbove ? high : low;
     EXACT float farEnd = eyeAbove ? low : high;
     EXACT float middle = 0.5f * (low + high);
-    if (!entered) {
-      entered = true;
+    if (!inside) {
+      inside = true;
       // Nothing lies before the first piece of the ray's way through the volume.
-      bool first = eyeAbove ? ray.sHigh <= float(k + 1) : ray.sLow >= float(k);
-      arriving = first ? 1.0f : rayAttenuation(BLOCK_HAND_ON ray, layout_, k, nearEnd);
-      if (arriving < hiddenBelow && largestAttenuation(BLOCK_HAND_ON ray, layout_, k, nearEnd) < hiddenBelow) break;
+      open = eyeAbove ? ray.sHigh <= float(k + 1) : ray.sLow >= float(k);
     }
-    if (haveBefore && arriving < hiddenBelow) break;
+    if (entered && arriving < hiddenBelow) break;
     ++traced;
     EXACT float valueNear = haveBefore ? before : rayPlace(BLOCK_HAND_ON ray, layout_, k, nearEnd);
     EXACT float valueMiddle = rayPlace(BLOCK_HAND_ON ray, layout_, k, middle);
@@ -245,6 +247,12 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay ray, CellLayout layout_
       TableValue mean =
           half_ == 0 ? tableMean(BLOCK_HAND_ON valueNear, valueMiddle) : tableMean(BLOCK_HAND_ON valueMiddle, valueFar);
       if (!(mean.extinction > kLeastExtinction)) continue;
+      if (!entered) {
+        entered = true;
+        arriving = open ? 1.0f : rayAttenuation(BLOCK_HAND_ON ray, layout_, k, nearEnd);
+        hidden = arriving < hiddenBelow && largestAttenuation(BLOCK_HAND_ON ray, layout_, k, nearEnd) < hiddenBelow;
+        if (hidden) break;
+      }
       EXACT float pieceDepth = mean.extinction * stepLength;
       EXACT float taken = absorbed(pieceDepth);
       EXACT float emitted = arriving * taken;
@@ -260,6 +268,7 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay ray, CellLayout layout_
       emission = emission + emitted;
       depth = depth + pieceDepth;
     }
+    if (hidden) break;
   }
   RaySums sums;
   sums.red = red;
