@@ -17,6 +17,7 @@
 #include "splat/draw_cells.h"
 #include "splat/draw_kernels.h"
 #include "splat/kernel_splats.h"
+#include "splat/near_field.h"
 #include "splat/pinned_attenuation.h"
 
 namespace freevoxel {
@@ -203,6 +204,7 @@ AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, Atten
   if (source == AttenuationSource::corrected) {
     if (!coarse) coarse.emplace(grid, classified);
     coarse->correct(target, result);
+    result = withNearField(grid, table, cubes, target, kNearPlanes, result);
   }
   return result;
 }

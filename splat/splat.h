@@ -32,7 +32,7 @@ enum class AttenuationSource {
   automatic,  ///< pinned, if the file has a pin that is the target; else with an attenuation file, and the target
               ///< outside the volume: `corrected` for the eye and `stored` for lamps; else swept
   stored,     ///< the 26 directions of the file, which run on to the outside even if the target is inside
-  corrected,  ///< stored, corrected by a sweep of a coarse copy of the volume
+  corrected,  ///< stored, corrected by a sweep of a coarse copy of the volume, and right before a voxel traced
   swept,      ///< one sweep over the values for this target
   pinned,     ///< a sweep for this target that the file holds: the bits that `swept` gives
   quotient,   ///< stored, divided by the same at the target's own voxel: the paper's A_B / A_V for an eye inside

@@ -16,6 +16,10 @@ constexpr double kMargin = 2.0;
 /// Samples per plane along each ray: a piece of a ray between two planes bends where it passes from cell to cell.
 constexpr int kSteps = 2;
 
+/// Planes before a voxel through which its own ray is traced; what lies beyond is interpolated among the lattice's
+/// rays.
+constexpr size_t kNearPlanes = 3;
+
 /// One of the six pyramids of voxels that see the target mostly along one axis, swept from the target outwards.
 ///
 /// The sweep carries its state along rays from the target, a lattice of them one voxel apart on the farthest plane, and
@@ -57,7 +61,7 @@ class PyramidSweep {
     const int bands = (raysC_ + kBandRows - 1) / kBandRows;
 #pragma omp parallel for schedule(dynamic, 1)
     for (int band = 0; band < bands; ++band) {
-      Band rays{band * kBandRows, std::min((band + 1) * kBandRows, raysC_ - 1), {}};
+      Band rays{band * kBandRows, std::min((band + 1) * kBandRows, raysC_ - 1), {}, {}, {}};
       if (rays.first >= rays.last) continue;
       rays.attenuation.assign(size_t(rays.last - rays.first + 1) * size_t(raysB_), 1.0f);
       // Light leaves through the half voxel beyond the outermost plane, or starts at the target.
@@ -66,6 +70,14 @@ class PyramidSweep {
       for (int n = 0; n < sizeA_; ++n) {
         const int k = nearest - side_ * n;
         if (distanceOf(k) <= 0.0) continue;
+        if (rays.steps.size() == kNearPlanes) {
+          std::rotate(rays.before.begin(), rays.before.begin() + 1, rays.before.end());
+          rays.steps.erase(rays.steps.begin());
+        } else {
+          rays.before.emplace_back();
+        }
+        rays.before.back() = rays.attenuation;
+        rays.steps.push_back(stepTo(before, k));
         traceRays(before, k, rays);
         before = k;
         storePlane(k, rays);
@@ -75,12 +87,6 @@ class PyramidSweep {
 
  private:
   static constexpr int kBandRows = 16;
-  /// Rows first..last of rays, and their attenuation so far; voxels between rows first and last are stored from them.
-  struct Band {
-    int first, last;
-    std::vector<float> attenuation;
-  };
-
   double distanceOf(double k) const {
     return towards_.directional ? 1.0 : (towards_.index[a_] - k) * side_;
   }
@@ -149,49 +155,87 @@ class PyramidSweep {
                                  cubeC * cubeStrideC_)] != 0;
   }
 
+  /// The way of rays from plane position `before` to plane k: where each is there, in units of the lattice.
+  struct Step {
+    int k;
+    double way;  ///< planes
+    double scale0, scale1;
+    double shiftB0, shiftB1, shiftC0, shiftC1;
+    int lowerPlane;
+    glm::dvec3 edgeA;
+  };
+  Step stepTo(double before, int k) const {
+    const double way = std::abs(before - k);
+    return {k,
+            way,
+            scaleAt(before),
+            scaleAt(k),
+            shiftAt(before, b_),
+            shiftAt(k, b_),
+            shiftAt(before, c_),
+            shiftAt(k, c_),
+            std::clamp(side_ > 0 ? k : k - 1, 0, sizeA_ - 1),
+            towards_.lengthFromIndex[a_] * way};
+  }
+
+  /// Rows first..last of rays, and their attenuation so far; voxels between rows first and last are stored from them.
+  struct Band {
+    int first, last;
+    std::vector<float> attenuation;
+    /// The last kNearPlanes steps, the latest last, and attenuation before each.
+    std::vector<Step> steps;
+    std::vector<std::vector<float>> before;
+  };
+
+  /// Optical depth, in log2, of one step of the ray at (b, c) of the lattice.
+  float depthOf(const Step& step, double b, double c) const {
+    const double lowestB = -0.5, highestB = sizeB_ - 0.5, lowestC = -0.5, highestC = sizeC_ - 0.5;
+    const double b0 = b * step.scale0 + step.shiftB0, b1 = b * step.scale1 + step.shiftB1;
+    if (std::max(b0, b1) < lowestB || std::min(b0, b1) > highestB) return 0.0f;
+    const double c0 = c * step.scale0 + step.shiftC0, c1 = c * step.scale1 + step.shiftC1;
+    if (std::max(c0, c1) < lowestC || std::min(c0, c1) > highestC) return 0.0f;
+    // Between two planes a ray moves by at most a voxel sideways, which is how far visible cubes reach out.
+    if (!visibleAt(step.lowerPlane, b1, c1)) return 0.0f;
+    // The share of the way that lies inside the volume.
+    double from = 0.0, to = 1.0;
+    const auto clip = [&](double p0, double p1, double lowest, double highest) {
+      if (p0 < lowest) from = std::max(from, (lowest - p0) / (p1 - p0));
+      if (p0 > highest) from = std::max(from, (highest - p0) / (p1 - p0));
+      if (p1 < lowest) to = std::min(to, (lowest - p0) / (p1 - p0));
+      if (p1 > highest) to = std::min(to, (highest - p0) / (p1 - p0));
+    };
+    clip(b0, b1, lowestB, highestB);
+    clip(c0, c1, lowestC, highestC);
+    if (from >= to) return 0.0f;
+    const auto place = [&](double t) {
+      return placeAt(step.k, float(step.way * (1.0 - t)), float(b0 + t * (b1 - b0)), float(c0 + t * (c1 - c0)));
+    };
+    float start = place(from);
+    float extinction = 0.0f;
+    for (int piece = 1; piece <= kSteps; ++piece) {
+      const float end = place(from + (to - from) * piece / kSteps);
+      extinction += table_.meanExtinction(start, end);
+      start = end;
+    }
+    if (!(extinction > 0.0f)) return 0.0f;
+    const double length = glm::length(step.edgeA * double(-side_) + towards_.lengthFromIndex[b_] * (b1 - b0) +
+                                      towards_.lengthFromIndex[c_] * (c1 - c0));
+    return extinction * float(length * (to - from) / kSteps);
+  }
+
   /// Takes a band's rays from plane position `before` to plane k.
   void traceRays(double before, int k, Band& rays) const {
-    const double way = std::abs(before - k);
-    if (way == 0.0) return;
-    const double scale0 = scaleAt(before), scale1 = scaleAt(k);
-    const double shiftB0 = shiftAt(before, b_), shiftB1 = shiftAt(k, b_);
-    const double shiftC0 = shiftAt(before, c_), shiftC1 = shiftAt(k, c_);
-    const glm::dvec3 edgeA = towards_.lengthFromIndex[a_] * way;
-    const glm::dvec3 edgeB = towards_.lengthFromIndex[b_], edgeC = towards_.lengthFromIndex[c_];
-    const int lowerPlane = std::clamp(side_ > 0 ? k : k - 1, 0, sizeA_ - 1);
-    const double lowestB = -0.5, highestB = sizeB_ - 0.5, lowestC = -0.5, highestC = sizeC_ - 0.5;
+    if (before == k) return;
+    const Step step = stepTo(before, k);
+    const double lowestC = -0.5, highestC = sizeC_ - 0.5;
     for (int j = rays.first; j <= rays.last; ++j) {
-      const double c0 = (firstC_ + j) * scale0 + shiftC0, c1 = (firstC_ + j) * scale1 + shiftC1;
+      const double c = firstC_ + j;
+      const double c0 = c * step.scale0 + step.shiftC0, c1 = c * step.scale1 + step.shiftC1;
       if (std::max(c0, c1) < lowestC || std::min(c0, c1) > highestC) continue;
+      float* row = rays.attenuation.data() + size_t(j - rays.first) * size_t(raysB_);
       for (int i = 0; i < raysB_; ++i) {
-        const double b0 = (firstB_ + i) * scale0 + shiftB0, b1 = (firstB_ + i) * scale1 + shiftB1;
-        if (std::max(b0, b1) < lowestB || std::min(b0, b1) > highestB) continue;
-        // Between two planes a ray moves by at most a voxel sideways, which is how far visible cubes reach out.
-        if (!visibleAt(lowerPlane, b1, c1)) continue;
-        // The share of the way that lies inside the volume.
-        double from = 0.0, to = 1.0;
-        const auto clip = [&](double p0, double p1, double lowest, double highest) {
-          if (p0 < lowest) from = std::max(from, (lowest - p0) / (p1 - p0));
-          if (p0 > highest) from = std::max(from, (highest - p0) / (p1 - p0));
-          if (p1 < lowest) to = std::min(to, (lowest - p0) / (p1 - p0));
-          if (p1 > highest) to = std::min(to, (highest - p0) / (p1 - p0));
-        };
-        clip(b0, b1, lowestB, highestB);
-        clip(c0, c1, lowestC, highestC);
-        if (from >= to) continue;
-        const size_t ray = size_t(j - rays.first) * size_t(raysB_) + size_t(i);
-        float start = placeAt(k, float(way * (1.0 - from)), float(b0 + from * (b1 - b0)), float(c0 + from * (c1 - c0)));
-        float extinction = 0.0f;
-        for (int step = 1; step <= kSteps; ++step) {
-          const double t = from + (to - from) * step / kSteps;
-          const float end = placeAt(k, float(way * (1.0 - t)), float(b0 + t * (b1 - b0)), float(c0 + t * (c1 - c0)));
-          extinction += table_.meanExtinction(start, end);
-          start = end;
-        }
-        if (extinction > 0.0f) {
-          const double length = glm::length(edgeA * double(-side_) + edgeB * (b1 - b0) + edgeC * (c1 - c0));
-          rays.attenuation[ray] *= std::exp2(-extinction * float(length * (to - from) / kSteps));
-        }
+        const float depth = depthOf(step, firstB_ + i, c);
+        if (depth > 0.0f) row[i] *= std::exp2(-depth);
       }
     }
   }
@@ -228,7 +272,7 @@ class PyramidSweep {
       const int j = std::min(int(atC), raysC_ - 2);
       if (j < rays.first || j >= rays.last) continue;
       const float tc = atC - float(j);
-      const float* row = rays.attenuation.data() + size_t(j - rays.first) * size_t(raysB_);
+      const float* row = rays.before.front().data() + size_t(j - rays.first) * size_t(raysB_);
       const float* next = row + raysB_;
       uint16_t* out = result_.values.data() + int64_t(k) * strideA_ + int64_t(c) * strideC_;
       for (int b = b0; b < b1; ++b) {
@@ -237,7 +281,14 @@ class PyramidSweep {
         const int i = std::min(int(atB), raysB_ - 2);
         const float tb = atB - float(i);
         const float low = row[i] + tb * (row[i + 1] - row[i]), high = next[i] + tb * (next[i + 1] - next[i]);
-        out[int64_t(b) * strideB_] = uint16_t((low + tc * (high - low)) * AttenuationGrid::kUnit + 0.5f);
+        float attenuation = low + tc * (high - low);
+        if (attenuation > 0.0f) {
+          float depth = 0.0f;
+          for (const Step& step : rays.steps)
+            depth += depthOf(step, firstB_ + double(atB), firstC_ + double(atC));
+          if (depth > 0.0f) attenuation *= std::exp2(-depth);
+        }
+        out[int64_t(b) * strideB_] = uint16_t(attenuation * AttenuationGrid::kUnit + 0.5f);
       }
     }
   }

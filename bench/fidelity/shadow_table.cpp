@@ -5,6 +5,7 @@
 
 #include "bench/fidelity/tables.h"
 #include "splat/coarse_volume.h"
+#include "splat/near_field.h"
 #include "splat/raycast.h"
 #include "splat/stored_attenuation.h"
 
@@ -55,7 +56,8 @@ double shadowPsnr(const Samples& samples, const AttenuationGrid& grid, const std
 }  // namespace
 
 void addShadows(Table& table, const Scene& scene, const TableOptions& options) {
-  if (table.head.empty()) table.head = {"volume", "lamp", "nearest of 26", "stored", "corrected", "swept"};
+  if (table.head.empty())
+    table.head = {"volume", "lamp", "nearest of 26", "stored", "corrected", "corrected, near field traced", "swept"};
   std::vector<Classified> ofCode;
   for (uint32_t code = 0; code <= scene.grid.coding.largest; ++code)
     ofCode.push_back(scene.transfer.at(scene.grid.coding.decode(code)));
@@ -78,7 +80,7 @@ void addShadows(Table& table, const Scene& scene, const TableOptions& options) {
     const AttenuationGrid swept = sweptAttenuation(scene.grid, classification, cubes, target);
     std::vector<std::string> row = {scene.source.title, name};
     if (target.inside(scene.grid.dims)) {
-      row.insert(row.end(), 3, "-");
+      row.insert(row.end(), 4, "-");
     } else {
       AttenuationGrid stored = storedAttenuation(file, target, StoredLookup::interpolated);
       row.push_back(
@@ -86,6 +88,9 @@ void addShadows(Table& table, const Scene& scene, const TableOptions& options) {
       row.push_back(fmt::format("{:.1f}", shadowPsnr(samples, stored, marched)));
       coarse.correct(target, stored);
       row.push_back(fmt::format("{:.1f}", shadowPsnr(samples, stored, marched)));
+      row.push_back(fmt::format(
+          "{:.1f}",
+          shadowPsnr(samples, withNearField(scene.grid, classification, cubes, target, kNearPlanes, stored), marched)));
     }
     row.push_back(fmt::format("{:.1f}", shadowPsnr(samples, swept, marched)));
     table.rows.push_back(row);
