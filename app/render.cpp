@@ -253,6 +253,11 @@ void drawVolume(RenderOptions options, const CLI::App& command, Session& session
     openVolume(options.input, options.raw);  // what ails the file comes first
     throw UsageError("--transfer is required to draw a volume");
   }
+  if (options.splat.attenuation == AttenuationSource::pinned ||
+      options.splat.lightAttenuation == AttenuationSource::pinned) {
+    throw UsageError(
+        "pinned attenuation is in an attenuation file: freevoxel precompute VOLUME --pin-light X,Y,Z -o FILE.fvx");
+  }
   const Volume volume = session.timed("read", [&] { return readVolume(options.input, options.raw); });
   const TransferFunction transfer = chooseTransfer(options.transfer, volume);
   if (transfer.isLabels) keepLabelsApart(options, command);

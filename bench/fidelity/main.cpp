@@ -38,24 +38,43 @@ void forEachScene(const Options& options, const std::function<void(const Scene&)
   }
 }
 
-std::string measure(const Options& options) {
-  if (options.what == "quality") {
-    QualityTables tables;
-    forEachScene(options, [&](const Scene& scene) { addQuality(tables, scene, options.tables); });
-    return fmt::format("Against the post-classified reference:\n\n{}\nAgainst the pre-classified reference:\n\n{}",
-                       tables.post.markdown(), tables.pre.markdown());
+void write(const Options& options, const std::string& text) {
+  if (options.output.empty()) {
+    fmt::print("{}", text);
+    return;
   }
-  if (options.what == "references") {
-    forEachScene(options, [&](const Scene& scene) { castReferences(scene, options.tables); });
-    return {};
-  }
+  std::ofstream file(options.output);
+  file << text;
+  if (!file.flush()) throw MachineError(fmt::format("{}: cannot be written", options.output));
+}
+
+/// After every scene, so that a run that is cut short leaves what it has.
+void measureQuality(const Options& options) {
+  QualityTables tables;
+  std::string text;
+  forEachScene(options, [&](const Scene& scene) {
+    addQuality(tables, scene, options.tables);
+    text = fmt::format(
+        "{} views of {} x {}, PSNR in dB, in brackets the worst view. Against the post-classified reference:\n\n{}\n"
+        "Against the pre-classified reference:\n\n{}\nBars, pooled PSNR against the post-classified reference:\n\n{}",
+        options.tables.views, options.tables.imageSize.x, options.tables.imageSize.y, tables.post.markdown(),
+        tables.pre.markdown(), tables.bars.markdown());
+    if (!options.output.empty()) write(options, text);
+  });
+  if (options.output.empty()) write(options, text);
+}
+
+void measure(const Options& options) {
+  if (options.what == "quality") return measureQuality(options);
+  if (options.what == "references")
+    return forEachScene(options, [&](const Scene& scene) { castReferences(scene, options.tables); });
   const std::pair<const char*, void (*)(Table&, const Scene&, const TableOptions&)> simple[] = {
       {"shadows", addShadows}, {"inside", addInside}, {"hidden", addHidden}, {"lights", addLights}};
   for (const auto& [name, add] : simple) {
     if (options.what != name) continue;
     Table table;
     forEachScene(options, [&, add = add](const Scene& scene) { add(table, scene, options.tables); });
-    return table.markdown();
+    return write(options, table.markdown());
   }
   throw InternalError("internal error: unknown table");
 }
@@ -85,15 +104,7 @@ int run(int argc, char** argv) {
     drawFigures(options.output, options.tables.folders);
     return 0;
   }
-  const std::string text = measure(options);
-  if (text.empty()) return 0;
-  if (options.output.empty()) {
-    fmt::print("{}", text);
-  } else {
-    std::ofstream file(options.output);
-    file << text;
-    if (!file.flush()) throw MachineError(fmt::format("{}: cannot be written", options.output));
-  }
+  measure(options);
   return 0;
 }
 

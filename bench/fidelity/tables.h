@@ -22,6 +22,7 @@ void castReferences(const Scene& scene, const TableOptions& options);
 /// attenuation: a column.
 struct QualityTables {
   Table post, pre;
+  Table bars;  ///< a row per scene: how far cells are above or below what they are measured by
 };
 void addQuality(QualityTables& tables, const Scene& scene, const TableOptions& options);
 

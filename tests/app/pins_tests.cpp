@@ -77,6 +77,7 @@ TEST_F(Pins, areRefusedWhereTheyMakeNoSense) {
   expectRefusal(folder, words(make + "--pin-light 1,2"), 2, "--pin-light");
   expectRefusal(folder, words(make + "--pin-light 1,2,nan"), 2, "--pin-light");
   expectRefusal(folder, words("render plain.fvx --attenuation pinned -o a.png"), 1, "--pin-light");
+  expectRefusal(folder, words("render cloud.nrrd --transfer t.json --attenuation pinned -o a.png"), 2, "--pin-light");
   expectRefusal(folder, words("render plain.fvx --light-attenuation pinned --light-direction 1,2,3 -o a.png"), 1,
                 "--pin-direction");
 }
