@@ -135,7 +135,8 @@ struct Splatter::State {
 
   /// The source that `automatic` stands for. Throws InputError if there is no file to take it from.
   AttenuationSource chosen(AttenuationSource source, const Towards& target, bool lamp) const;
-  AttenuationGrid attenuationTowards(const Towards& target, AttenuationSource source);
+  /// What kernels draw leaves out a voxel's own matter, so there the near field is not traced.
+  AttenuationGrid attenuationTowards(const Towards& target, AttenuationSource source, Footprint footprint);
   void lightVoxels(const Camera& camera, const SplatOptions& options, SplatStatistics& statistics);
   /// Visible blocks, without hidden ones if asked for, in the order asked for.
   std::vector<VisibleBlock> blocksToDraw(const AttenuationGrid& attenuation, const SplatOptions& options,
@@ -196,7 +197,8 @@ AttenuationSource Splatter::State::chosen(AttenuationSource source, const Toward
   return source;
 }
 
-AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, AttenuationSource source) {
+AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, AttenuationSource source,
+                                                    Footprint footprint) {
   if (source == AttenuationSource::swept) return sweptAttenuation(grid, table, cubes, target);
   if (source == AttenuationSource::pinned) return pinnedAttenuation(*file, findPin(*file, target).value());
   AttenuationGrid result = storedAttenuation(
@@ -204,7 +206,7 @@ AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, Atten
   if (source == AttenuationSource::corrected) {
     if (!coarse) coarse.emplace(grid, classified);
     coarse->correct(target, result);
-    result = withNearField(grid, table, cubes, target, kNearPlanes, result);
+    if (footprint == Footprint::cell) result = withNearField(grid, table, cubes, target, kNearPlanes, result);
   }
   return result;
 }
@@ -223,7 +225,7 @@ void Splatter::State::lightVoxels(const Camera& camera, const SplatOptions& opti
     } else if (source == AttenuationSource::pinned) {
       attenuation.pin = findPin(*file, target);
     } else {
-      attenuation.grid = attenuationTowards(target, source);
+      attenuation.grid = attenuationTowards(target, source, options.footprint);
     }
     lamps.push_back(std::move(attenuation));
     statistics.lightAttenuation = attenuationSourceName(source);
@@ -376,8 +378,8 @@ void Splatter::prepare(const Camera& camera, const SplatOptions& options) {
   source = state.chosen(source, eye, false);
   statistics.attenuation = attenuationSourceName(source);
   state.frame.reset();
-  AttenuationGrid attenuation =
-      paper ? storedAttenuation(*state.file, eye, StoredLookup::nearest) : state.attenuationTowards(eye, source);
+  AttenuationGrid attenuation = paper ? storedAttenuation(*state.file, eye, StoredLookup::nearest)
+                                      : state.attenuationTowards(eye, source, options.footprint);
   statistics.attenuationSeconds = secondsSince(attenuationStart);
   const Clock::time_point lightStart = Clock::now();
   state.lightVoxels(camera, options, statistics);
