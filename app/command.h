@@ -33,5 +33,6 @@ Command addCompare(CLI::App& program, CommonOptions& common);
 Command addTransfer(CLI::App& program, CommonOptions& common);
 Command addTrace(CLI::App& program, CommonOptions& common);
 Command addSheet(CLI::App& program, CommonOptions& common);
+Command addSpeedup(CLI::App& program, CommonOptions& common);
 
 }  // namespace freevoxel

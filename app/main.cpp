@@ -114,10 +114,11 @@ int run(int argc, char** argv, const Ranks& ranks) {
       "freevoxel COMMAND --help is complete. Exit status: 0 done, 1 the input or the machine would not do, "
       "2 usage.");
   CommonOptions common;
-  const std::vector<Command> commands = {
-      addGenerate(program, common), addPrecompute(program, common), addInfo(program, common),
-      addVerify(program, common),   addRender(program, common),     addCompare(program, common),
-      addTransfer(program, common), addSheet(program, common),      addTrace(program, common)};
+  const std::vector<Command> commands = {addGenerate(program, common), addPrecompute(program, common),
+                                         addInfo(program, common),     addVerify(program, common),
+                                         addRender(program, common),   addCompare(program, common),
+                                         addTransfer(program, common), addSheet(program, common),
+                                         addTrace(program, common),    addSpeedup(program, common)};
   int status = kDone;
   const Command* command = parse(program, commands, argc, argv, ranks, status);
   return command == nullptr ? status : runTogether(*command, typedCommand(argc, argv), common, ranks);

@@ -37,20 +37,21 @@ std::string hostName() {
 
 }  // namespace
 
+Partition parsePartitionName(std::string_view text) {
+  Partition partition;
+  if (!parsePartition(text, partition)) {
+    throw UsageError(fmt::format("expected round-robin, hilbert, slab, random:SEED or file:F, found '{}'", text));
+  }
+  return partition;
+}
+
 void addShareOptions(CLI::App& command, ShareOptions& options) {
   const std::string group = "Several processes (mpirun -n N freevoxel ...; the bits are the same for any number)";
-  addParsed<Partition>(
-      command, "--partition", options.partition, "round-robin|hilbert|slab|random:SEED|file:F",
-      "which rank draws which block: in turn, those with most to draw first; runs of the Hilbert "
-      "curve; slabs across z; at random; or as a text file says, a rank for every block (default "
-      "round-robin)",
-      [](std::string_view text) {
-        Partition partition;
-        if (!parsePartition(text, partition)) {
-          throw UsageError(fmt::format("expected round-robin, hilbert, slab, random:SEED or file:F, found '{}'", text));
-        }
-        return partition;
-      })
+  addParsed<Partition>(command, "--partition", options.partition, "round-robin|hilbert|slab|random:SEED|file:F",
+                       "which rank draws which block: in turn, those with most to draw first; runs of the Hilbert "
+                       "curve; slabs across z; at random; or as a text file says, a rank for every block (default "
+                       "round-robin)",
+                       parsePartitionName)
       ->group(group);
   addChoice<CompositeMethod>(command, "--composite", options.composite,
                              {{"tiles", CompositeMethod::tiles}, {"reduce", CompositeMethod::reduce}},

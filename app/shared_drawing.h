@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "app/options.h"
@@ -21,6 +22,8 @@ struct ShareOptions {
   CompositeMethod composite = CompositeMethod::tiles;
   bool colourByRank = false;  ///< everything in the colour of the rank that drew it (papers/freevoxels Fig. 5)
 };
+/// Throws UsageError.
+Partition parsePartitionName(std::string_view text);
 /// --partition and --composite.
 void addShareOptions(CLI::App& command, ShareOptions& options);
 

@@ -1,8 +1,6 @@
 #include "parallel/composite.h"
 
 #include <algorithm>
-#include <climits>
-#include <cstring>
 
 #include "base/error.h"
 
@@ -11,30 +9,6 @@ namespace freevoxel {
 namespace {
 
 constexpr int kGatherTag = 1000;  // rounds count from 0
-
-size_t maskWords(size_t tiles) {
-  return (tiles + 31) / 32;
-}
-
-/// Whether any bit is set: sums are not negative, so that is whether anything was added.
-bool anything(const float* values, size_t count) {
-  uint32_t bits = 0;
-  for (size_t i = 0; i < count; ++i) {
-    uint32_t word;
-    std::memcpy(&word, values + i, sizeof word);
-    bits |= word;
-  }
-  return bits != 0;
-}
-
-bool allBelow(const float* values, size_t count, std::span<const float> limits) {
-  bool below = true;
-  for (size_t i = 0; i < count; i += limits.size()) {
-    for (size_t c = 0; c < limits.size(); ++c)
-      below = below && values[i + c] < limits[c];
-  }
-  return below;
-}
 
 bool agreed(const Ranks& ranks, bool mine) {
   int all = mine ? 1 : 0;
@@ -64,74 +38,28 @@ std::vector<int> compositeRounds(int rankCount) {
 
 Compositor::Compositor(const Ranks& ranks, glm::ivec2 imageSize, int channels, size_t slicePixels)
     : ranks_(ranks),
-      channels_(size_t(channels)),
-      pixels_(size_t(imageSize.x) * size_t(imageSize.y)),
-      tiles_((pixels_ + (kCompositeTile - 1)) / kCompositeTile),
-      sliceTiles_(
-          std::clamp((slicePixels + (kCompositeTile - 1)) / kCompositeTile, size_t(1), std::max(tiles_, size_t(1)))),
+      packing_(imageSize, channels),
+      sliceTiles_(std::clamp((slicePixels + (kCompositeTile - 1)) / kCompositeTile, size_t(1),
+                             std::max(packing_.tiles(), size_t(1)))),
       rounds_(compositeRounds(ranks.rankCount())) {
   if (rounds_.empty()) return;
   const Range slice{0, sliceTiles_};
   // Of the pieces of a round; later rounds have less to split. Every piece has a mask of its own.
   size_t words = 0;
   for (int i = 0; i < rounds_.front(); ++i)
-    words += packedWords({0, slice.size() / size_t(rounds_.front()) + 1});
+    words += packing_.mostWords({0, slice.size() / size_t(rounds_.front()) + 1});
   for (const int radix : rounds_)
-    words = std::max(words, size_t(radix) * packedWords({0, slice.size() / size_t(radix) + 1}));
+    words = std::max(words, size_t(radix) * packing_.mostWords({0, slice.size() / size_t(radix) + 1}));
   outgoing_.resize(words);
   incoming_.resize(words);
   if (ranks.isRoot()) {
-    gathered_.resize(size_t(ranks.rankCount()) * packedWords({0, slice.size() / size_t(ranks.rankCount()) + 2}));
+    gathered_.resize(size_t(ranks.rankCount()) * packing_.mostWords({0, slice.size() / size_t(ranks.rankCount()) + 2}));
   }
 }
 
-Compositor::Range Compositor::piece(Range whole, int pieces, int index) const {
+Compositor::Range Compositor::piece(Range whole, int pieces, int index) {
   const auto cut = [&](int i) { return whole.first + whole.size() * size_t(i) / size_t(pieces); };
   return {cut(index), cut(index + 1)};
-}
-
-size_t Compositor::packedWords(Range range) const {
-  return maskWords(range.size()) + range.size() * size_t(kCompositeTile) * channels_;
-}
-
-size_t Compositor::tileFloats(size_t tile) const {
-  return std::min(size_t(kCompositeTile), pixels_ - tile * kCompositeTile) * channels_;
-}
-
-size_t Compositor::pack(const Image& image, Range range, uint32_t* words, std::span<const float> limits,
-                        bool& below) const {
-  std::fill_n(words, maskWords(range.size()), 0u);
-  uint32_t* out = words + maskWords(range.size());
-  for (size_t tile = range.first; tile < range.last; ++tile) {
-    const float* values = image.pixels.data() + tile * kCompositeTile * channels_;
-    const size_t count = tileFloats(tile);
-    if (!anything(values, count)) continue;
-    if (!limits.empty()) below = allBelow(values, count, limits) && below;
-    words[(tile - range.first) / 32] |= 1u << (tile - range.first) % 32;
-    std::memcpy(out, values, count * sizeof(float));
-    out += count;
-  }
-  return size_t(out - words);
-}
-
-template <Compositor::Unpack how>
-void Compositor::unpack(Image& image, Range range, const uint32_t* words) const {
-  const uint32_t* from = words + maskWords(range.size());
-  for (size_t tile = range.first; tile < range.last; ++tile) {
-    if ((words[(tile - range.first) / 32] >> (tile - range.first) % 32 & 1u) == 0) continue;
-    float* values = image.pixels.data() + tile * kCompositeTile * channels_;
-    const size_t count = tileFloats(tile);
-    if constexpr (how == Unpack::add) {
-      for (size_t i = 0; i < count; ++i) {
-        float value;
-        std::memcpy(&value, from + i, sizeof value);
-        values[i] += value;
-      }
-    } else {
-      std::memcpy(values, from, count * sizeof(float));
-    }
-    from += count;
-  }
 }
 
 bool Compositor::addSlice(Image& image, Range slice, std::span<const float> limits) {
@@ -160,14 +88,13 @@ bool Compositor::addSlice(Image& image, Range slice, std::span<const float> limi
   std::vector<const uint32_t*> gatheredFrom(gathering.size());
   size_t used = 0;
   for (int of = 1; of < int(gathering.size()); ++of) {
-    const size_t words = packedWords(bandOf(of));
+    const size_t words = packing_.mostWords(bandOf(of));
     gatheredFrom[size_t(of)] = gathered_.data() + used;
     MPI_Irecv(gathered_.data() + used, int(words), MPI_UINT32_T, of, kGatherTag, communicator, &gathering[size_t(of)]);
     used += words;
   }
 
   Range mine = slice;
-  bool unused = true;
   for (int round = 0, stride = 1; round < int(rounds_.size()); ++round) {
     const int radix = rounds_[size_t(round)];
     const int digit = rank / stride % radix;
@@ -179,14 +106,14 @@ bool Compositor::addSlice(Image& image, Range slice, std::span<const float> limi
     for (int i = 0; i < radix; ++i) {
       if (i == digit) continue;
       from[size_t(i)] = incoming_.data() + in;
-      MPI_Irecv(incoming_.data() + in, int(packedWords(kept)), MPI_UINT32_T, member(i), round, communicator,
+      MPI_Irecv(incoming_.data() + in, int(packing_.mostWords(kept)), MPI_UINT32_T, member(i), round, communicator,
                 &receives[size_t(i)]);
-      in += packedWords(kept);
+      in += packing_.mostWords(kept);
     }
     // Each begins with another partner, so that no rank is everybody's first.
     for (int step = 1; step < radix; ++step) {
       const int i = (digit + step) % radix;
-      const size_t count = pack(image, piece(mine, radix, i), outgoing_.data() + out, {}, unused);
+      const size_t count = packing_.pack(image, piece(mine, radix, i), outgoing_.data() + out);
       send(outgoing_.data() + out, count, member(i), round, &sends[size_t(i)]);
       out += count;
     }
@@ -195,7 +122,7 @@ bool Compositor::addSlice(Image& image, Range slice, std::span<const float> limi
       MPI_Status status;
       MPI_Waitany(radix, receives.data(), &i, &status);
       received(status);
-      unpack<Unpack::add>(image, kept, from[size_t(i)]);
+      packing_.add(image, kept, from[size_t(i)]);
     }
     MPI_Waitall(radix, sends.data(), MPI_STATUSES_IGNORE);
     mine = kept;
@@ -204,7 +131,7 @@ bool Compositor::addSlice(Image& image, Range slice, std::span<const float> limi
 
   bool below = true;
   MPI_Request sending = MPI_REQUEST_NULL;
-  const size_t count = pack(image, mine, outgoing_.data(), limits, below);
+  const size_t count = packing_.pack(image, mine, outgoing_.data(), limits, below);
   if (!ranks_.isRoot()) send(outgoing_.data(), count, 0, kGatherTag, &sending);
   const bool allSumsBelow = agreed(ranks_, below);
   for (int step = 1; step < int(gathering.size()); ++step) {
@@ -213,20 +140,20 @@ bool Compositor::addSlice(Image& image, Range slice, std::span<const float> limi
     MPI_Waitany(rankCount, gathering.data(), &of, &status);
     received(status);
     // Where the sum is zero, so is the root's own share of it.
-    unpack<Unpack::replace>(image, bandOf(of), gatheredFrom[size_t(of)]);
+    packing_.replace(image, bandOf(of), gatheredFrom[size_t(of)]);
   }
   MPI_Wait(&sending, MPI_STATUS_IGNORE);
   return allSumsBelow;
 }
 
 bool Compositor::add(Image& image, std::span<const float> limits) {
-  checkEqual(image.pixels.size(), pixels_ * channels_, "values of an image to be added");
-  checkEqual(limits.size(), channels_, "limits of an image to be added");
-  if (ranks_.rankCount() == 1) return allBelow(image.pixels.data(), image.pixels.size(), limits);
+  checkEqual(image.pixels.size(), packing_.values(), "values of an image to be added");
+  checkEqual(limits.size(), size_t(image.channels), "limits of an image to be added");
+  if (ranks_.rankCount() == 1) return allBelow(image.pixels, limits);
   const Ranks::Exchange exchange(ranks_);
   bool below = true;
-  for (size_t first = 0; first < tiles_; first += sliceTiles_)
-    below = addSlice(image, {first, std::min(tiles_, first + sliceTiles_)}, limits) && below;
+  for (size_t first = 0; first < packing_.tiles(); first += sliceTiles_)
+    below = addSlice(image, {first, std::min(packing_.tiles(), first + sliceTiles_)}, limits) && below;
   return below;
 }
 
@@ -241,7 +168,7 @@ bool addByReduce(const Ranks& ranks, Image& image, std::span<const float> limits
                  0, ranks.communicator());
     }
   }
-  const bool below = !ranks.isRoot() || allBelow(image.pixels.data(), image.pixels.size(), limits);
+  const bool below = !ranks.isRoot() || allBelow(image.pixels, limits);
   return ranks.rankCount() == 1 ? below : agreed(ranks, below);
 }
 

@@ -13,11 +13,10 @@
 
 #include "base/image.h"
 #include "parallel/ranks.h"
+#include "parallel/tile_packing.h"
 
 namespace freevoxel {
 
-/// Pixels of a tile: consecutive ones of the image in memory order. What travels or stays behind as a whole.
-inline constexpr int kCompositeTile = 64;
 /// Ranks of a group exchange pieces all at once if there are no more than this.
 inline constexpr int kCompositeRadix = 8;
 
@@ -47,23 +46,13 @@ class Compositor {
   const CompositeTraffic& traffic() const { return traffic_; }
 
  private:
-  struct Range {
-    size_t first, last;  ///< tiles
-    size_t size() const { return last - first; }
-  };
-  Range piece(Range whole, int pieces, int index) const;
-  size_t packedWords(Range range) const;  ///< at most
-  size_t tileFloats(size_t tile) const;
-  /// Packs the tiles of a range that are not zero; gives the number of words. If `limits` is not empty, clears `below`
-  /// unless all values are below them.
-  size_t pack(const Image& image, Range range, uint32_t* words, std::span<const float> limits, bool& below) const;
-  enum class Unpack { add, replace };
-  template <Unpack how>
-  void unpack(Image& image, Range range, const uint32_t* words) const;
+  using Range = TilePacking::Range;
+  static Range piece(Range whole, int pieces, int index);
   bool addSlice(Image& image, Range slice, std::span<const float> limits);
 
   const Ranks& ranks_;
-  size_t channels_, pixels_, tiles_, sliceTiles_;
+  TilePacking packing_;
+  size_t sliceTiles_;
   std::vector<int> rounds_;
   std::vector<uint32_t> outgoing_, incoming_, gathered_;
   CompositeTraffic traffic_;

@@ -19,7 +19,7 @@ section() {
 }
 
 section freevoxel
-for command in generate precompute transfer info verify render trace compare sheet; do
+for command in generate precompute transfer info verify render trace compare sheet speedup; do
   section "$command" "$command"
 done
 

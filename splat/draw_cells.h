@@ -42,7 +42,8 @@ class CellCanvas {
   virtual ~CellCanvas() = default;
   virtual void clear() = 0;
   virtual void draw(const CellFrame& frame, std::span<const VisibleBlock> blocks, CellCounts& counts) = 0;
-  /// kSumChannels channels in whole quanta: light in quanta of the frame, depth in 2^-6 and 2^-16.
+  /// kSumChannels channels in whole quanta: light in quanta of the frame, depth in 2^-6 and 2^-16. Takes them out: the
+  /// canvas is of no use until the next clear().
   virtual Image wholeQuanta() = 0;
 };
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "shaders/shared/quantum.h"
@@ -51,9 +52,9 @@ constexpr size_t kBlocksAtATime = 64;  // their samples fit the last-level cache
 
 class CpuCellCanvas final : public CellCanvas {
  public:
-  explicit CpuCellCanvas(glm::ivec2 imageSize) : image_(imageSize, kSumChannels) {}
+  explicit CpuCellCanvas(glm::ivec2 imageSize) : size_(imageSize) {}
 
-  void clear() override { std::fill(image_.pixels.begin(), image_.pixels.end(), 0.0f); }
+  void clear() override { image_ = Image(size_, kSumChannels); }
 
   void draw(const CellFrame& frame, std::span<const VisibleBlock> blocks, CellCounts& counts) override {
     while (!blocks.empty()) {
@@ -63,7 +64,7 @@ class CpuCellCanvas final : public CellCanvas {
     }
   }
 
-  Image wholeQuanta() override { return image_; }
+  Image wholeQuanta() override { return std::move(image_); }
 
  private:
   struct Prepared {
@@ -144,6 +145,7 @@ class CpuCellCanvas final : public CellCanvas {
     return uint64_t(sums.pieces);
   }
 
+  glm::ivec2 size_;
   Image image_;
   std::vector<Prepared> prepared_;
 };

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/glm.hpp>
 
+#include "base/error.h"
+
 namespace freevoxel {
 
 namespace {
@@ -42,20 +44,34 @@ PixelRay indexRay(glm::dvec3 origin, glm::dvec3 direction, glm::ivec3 dims) {
 
 }  // namespace
 
-std::vector<PixelRay> pixelRays(const Placement& placement, glm::ivec3 dims, const Camera& camera) {
+void pixelRays(const Placement& placement, glm::ivec3 dims, const Camera& camera, std::span<const uint8_t> tiles,
+               std::span<PixelRay> rays) {
   const ViewFrame frame = viewFrame(camera);
   const glm::dmat4 indexFromWorld = glm::inverse(placement.worldFromIndex());
   const double unit = placement.unitLength();
-  std::vector<PixelRay> rays(size_t(camera.imageSize.x) * size_t(camera.imageSize.y));
-#pragma omp parallel for schedule(static)
-  for (int y = 0; y < camera.imageSize.y; ++y) {
-    for (int x = 0; x < camera.imageSize.x; ++x) {
-      const Ray ray = pixelRay(frame, glm::dvec2(x, y) + 0.5);
-      rays[size_t(y) * size_t(camera.imageSize.x) + size_t(x)] =
-          indexRay(glm::dvec3(indexFromWorld * glm::dvec4(ray.origin, 1.0)),
-                   glm::dvec3(indexFromWorld * glm::dvec4(ray.direction * unit, 0.0)), dims);
+  const glm::ivec2 size = camera.imageSize, count = (size + (kRayTile - 1)) / kRayTile;
+  checkEqual(rays.size(), size_t(size.x) * size_t(size.y), "rays of an image");
+  checkEqual(tiles.size(), size_t(count.x) * size_t(count.y), "tiles of an image");
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int tile = 0; tile < count.x * count.y; ++tile) {
+    if (tiles[size_t(tile)] == 0) continue;
+    const glm::ivec2 low = glm::ivec2(tile % count.x, tile / count.x) * kRayTile;
+    const glm::ivec2 high = glm::min(low + kRayTile, size);
+    for (int y = low.y; y < high.y; ++y) {
+      for (int x = low.x; x < high.x; ++x) {
+        const Ray ray = pixelRay(frame, glm::dvec2(x, y) + 0.5);
+        rays[size_t(y) * size_t(size.x) + size_t(x)] =
+            indexRay(glm::dvec3(indexFromWorld * glm::dvec4(ray.origin, 1.0)),
+                     glm::dvec3(indexFromWorld * glm::dvec4(ray.direction * unit, 0.0)), dims);
+      }
     }
   }
+}
+
+std::vector<PixelRay> pixelRays(const Placement& placement, glm::ivec3 dims, const Camera& camera) {
+  const glm::ivec2 count = (camera.imageSize + (kRayTile - 1)) / kRayTile;
+  std::vector<PixelRay> rays(size_t(camera.imageSize.x) * size_t(camera.imageSize.y));
+  pixelRays(placement, dims, camera, std::vector<uint8_t>(size_t(count.x) * size_t(count.y), 1), rays);
   return rays;
 }
 

@@ -1,6 +1,8 @@
 // The rays of an image's pixels in the index space of a volume.
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "base/camera.h"
@@ -15,5 +17,11 @@ static_assert(sizeof(PixelRay) == 32 && offsetof(PixelRay, sLow) == 16 && offset
 
 /// One ray per pixel, row 0 first. Rays that miss the volume's box are empty.
 std::vector<PixelRay> pixelRays(const Placement& placement, glm::ivec3 dims, const Camera& camera);
+
+/// The same for those pixels of `rays`, which has one per pixel, that lie in the tiles wanted: squares of kRayTile
+/// pixels, row 0 first, 0 = not wanted. Others are left as they are.
+inline constexpr int kRayTile = 32;
+void pixelRays(const Placement& placement, glm::ivec3 dims, const Camera& camera, std::span<const uint8_t> tiles,
+               std::span<PixelRay> rays);
 
 }  // namespace freevoxel

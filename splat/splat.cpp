@@ -19,6 +19,7 @@
 #include "splat/kernel_splats.h"
 #include "splat/near_field.h"
 #include "splat/pinned_attenuation.h"
+#include "splat/pixel_rays.h"
 
 namespace freevoxel {
 
@@ -85,6 +86,20 @@ bool isHidden(const VisibleBlock& block, glm::ivec3 dims, const AttenuationGrid&
   return true;
 }
 
+/// Tiles of rays (kRayTile) in which one of the blocks may be seen.
+std::vector<uint8_t> coveredTiles(const VolumeView& view, std::span<const VisibleBlock> blocks) {
+  const glm::ivec2 count = (view.imageSize + (kRayTile - 1)) / kRayTile;
+  std::vector<uint8_t> covered(size_t(count.x) * size_t(count.y));
+  for (const VisibleBlock& block : blocks) {
+    const PixelBounds bounds = pixelBounds(view, block);
+    if (bounds.empty()) continue;
+    const glm::ivec2 first = bounds.low / kRayTile, last = (bounds.high - 1) / kRayTile;
+    for (int y = first.y; y <= last.y; ++y)
+      std::fill_n(covered.begin() + int64_t(y) * count.x + first.x, last.x - first.x + 1, uint8_t(1));
+  }
+  return covered;
+}
+
 Towards towardsEye(const ValueGrid& grid, const Camera& camera) {
   return camera.orthographicHeight ? Towards::direction(grid.placement, camera.eye - camera.target)
                                    : Towards::point(grid.placement, camera.eye);
@@ -132,6 +147,7 @@ struct Splatter::State {
     SplatStatistics statistics;
   };
   std::optional<Frame> frame;
+  std::vector<PixelRay> rays;  ///< of the frame, where blocks were drawn
 
   /// The source that `automatic` stands for. Throws InputError if there is no file to take it from.
   AttenuationSource chosen(AttenuationSource source, const Towards& target, bool lamp) const;
@@ -152,7 +168,7 @@ struct Splatter::State {
 
 Splatter::Splatter(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer,
                    Backend backend, int blockEdge)
-    : state_(std::make_unique<State>(State{grid, file, transfer, {}, {}, {}, {}, nullptr, {}, {}, blockEdge, {}})) {
+    : state_(std::make_unique<State>(State{grid, file, transfer, {}, {}, {}, {}, nullptr, {}, {}, blockEdge, {}, {}})) {
   check(blockEdge >= 1 && blockEdge <= 61, "a block's edge is 1 to 61 voxels");
   if (file != nullptr && !sameOpacity(transfer, file->transfer())) {
     throw InputError(fmt::format(
@@ -239,7 +255,9 @@ Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, c
   const Clock::time_point setupStart = Clock::now();
   const std::unique_ptr<CellCanvas> canvas =
       context ? makeGlCellCanvas(*context, camera.imageSize) : makeCpuCellCanvas(camera.imageSize);
-  const std::vector<PixelRay> rays = pixelRays(grid.placement, grid.dims, camera);
+  const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, share, statistics);
+  rays.resize(size_t(camera.imageSize.x) * size_t(camera.imageSize.y));
+  pixelRays(grid.placement, grid.dims, camera, coveredTiles(view, ordered), rays);
   CellFrame cells;
   cells.grid = &grid;
   cells.attenuation = &attenuation;
@@ -254,7 +272,6 @@ Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, c
       options.cull == Cull::hidden && (statistics.attenuation == attenuationSourceName(AttenuationSource::swept) ||
                                        statistics.attenuation == attenuationSourceName(AttenuationSource::pinned));
   cells.hiddenBelow = endRays ? kHiddenBelow : 0.0f;
-  const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, share, statistics);
   statistics.setupSeconds += secondsSince(setupStart);
   const Clock::time_point drawStart = Clock::now();
   CellCounts counts;
@@ -404,9 +421,24 @@ Sums Splatter::draw(float quantum, std::span<const uint8_t> share, Progress& pro
   // Powers of two: exact.
   const float units[kSumChannels] = {quantum, quantum, quantum, quantum, shared::kDepthHighUnit, shared::kDepthLowUnit};
   std::vector<float>& values = sums.image.pixels;
-  for (size_t i = 0; i < values.size(); ++i)
-    values[i] *= units[i % kSumChannels];
+#pragma omp parallel for schedule(static)
+  for (int64_t i = 0; i < int64_t(values.size()); i += kSumChannels) {
+    for (int c = 0; c < kSumChannels; ++c)
+      values[size_t(i + c)] *= units[c];
+  }
   return sums;
+}
+
+std::vector<BlockWork> Splatter::countWork(const Camera& camera) const {
+  const VolumeView view = volumeView(state_->grid.placement, camera);
+  std::vector<BlockWork> work;
+  work.reserve(state_->blocks.size());
+  for (const VisibleBlock& block : state_->blocks) {
+    const PixelBounds bounds = pixelBounds(view, block);
+    const glm::ivec2 size = bounds.empty() ? glm::ivec2(0) : bounds.high - bounds.low;
+    work.push_back({bounds.empty() ? 0 : block.visibleCells, uint64_t(size.x) * uint64_t(size.y)});
+  }
+  return work;
 }
 
 const SplatStatistics& Splatter::statistics() const {

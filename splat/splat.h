@@ -96,6 +96,12 @@ inline constexpr int kBlockEdge = 32;
 /// Names on the command line and in statistics.
 std::string_view attenuationSourceName(AttenuationSource source);
 
+/// What there is to draw in one block.
+struct BlockWork {
+  uint64_t cells = 0;   ///< visible ones, if the block is in view
+  uint64_t pixels = 0;  ///< of its bounding rectangle on the image
+};
+
 /// Renders frames of one volume under one transfer function. Move-only.
 class Splatter {
  public:
@@ -121,6 +127,8 @@ class Splatter {
   /// Sums of a share of the blocks, which may not be exact. `share`: per block of blocks(), 0 = left to somebody else;
   /// empty = all are drawn. The sums of shares add up to those of the whole, bit for bit.
   Sums draw(float quantum, std::span<const uint8_t> share, Progress& progress);
+  /// What there is to draw in each of blocks(), without drawing it.
+  std::vector<BlockWork> countWork(const Camera& camera) const;
   /// Of the frame as it was drawn last.
   const SplatStatistics& statistics() const;
 
