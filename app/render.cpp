@@ -166,7 +166,7 @@ std::string frameName(const std::string& path, int frame) {
 void drawFrames(const RenderOptions& options, const ValueGrid& grid, Session& session,
                 const std::function<Image(const Camera& camera, std::optional<Sums>& sums)>& draw) {
   const Camera first = makeCamera(options.camera, worldBounds(grid.placement, grid.dims));
-  nlohmann::ordered_json seconds = nlohmann::ordered_json::array();
+  nlohmann::ordered_json seconds = nlohmann::ordered_json::array(), hashes = nlohmann::ordered_json::array();
   for (int frame = 0; frame < std::max(1, options.frames); ++frame) {
     const auto start = std::chrono::steady_clock::now();
     const bool turning = options.frames > 0;
@@ -178,6 +178,7 @@ void drawFrames(const RenderOptions& options, const ValueGrid& grid, Session& se
     if (!session.ranks().isRoot()) continue;
     const auto named = [&](const std::string& path) { return turning ? frameName(path, frame) : path; };
     if (!options.sums.empty()) {
+      hashes.push_back(fmt::format("{:016x}", contentHash(std::as_bytes(std::span(sums.value().image.pixels)))));
       session.timed("write", [&] {
         writeExr(named(options.sums), sums.value().image, sumChannelNames(), session.imageMetadata());
       });
@@ -187,6 +188,7 @@ void drawFrames(const RenderOptions& options, const ValueGrid& grid, Session& se
     writePicture(output, std::move(picture), session);
   }
   if (options.frames > 0) session.statistics["frameSeconds"] = seconds;
+  if (!options.sums.empty()) session.statistics["sumsHashes"] = hashes;
 }
 
 void drawRays(const ValueGrid& grid, const TransferFunction& transfer, const RenderOptions& options, Session& session) {

@@ -1,5 +1,6 @@
 // freevoxel speedup: how much faster several ranks draw a picture (papers/freevoxels Fig. 8; DESIGN section 9).
 #include <fmt/format.h>
+#include <time.h>
 
 #include <algorithm>
 #include <chrono>
@@ -34,6 +35,7 @@ struct SpeedupOptions {
   std::vector<int> blockEdges = {kBlockEdge};
   int views = 1, repeats = 1;
   bool countOnly = false, json = false;
+  bool processorTime = false;
   std::vector<std::string> plots;
   CameraOptions camera;
   SplatOptions splat;
@@ -59,8 +61,12 @@ struct Row {
   double speedupWithComposite() const { return oneSeconds / (slowestSeconds + compositeSeconds); }
 };
 
-double secondsSince(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+/// Seconds since some moment: of the clock on the wall, or that processors have worked for this process.
+double secondsNow(bool processorTime) {
+  if (!processorTime) return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  timespec time{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
+  return double(time.tv_sec) + 1e-9 * double(time.tv_nsec);
 }
 
 template <class T>
@@ -108,21 +114,22 @@ void addBalance(const RankWork& work, int views, Row& row) {
 }
 
 /// Draws a share; the least time of several, since others on the machine can only add to it.
-Sums timedDraw(Splatter& splatter, float quantum, std::span<const uint8_t> share, int repeats, double& seconds) {
+Sums timedDraw(Splatter& splatter, float quantum, std::span<const uint8_t> share, const SpeedupOptions& options,
+               double& seconds) {
   Sums sums;
   seconds = INFINITY;
-  for (int i = 0; i < repeats; ++i) {
-    const auto start = std::chrono::steady_clock::now();
+  for (int i = 0; i < options.repeats; ++i) {
+    const double start = secondsNow(options.processorTime);
     sums = splatter.draw(quantum, share, silentProgress());
-    seconds = std::min(seconds, secondsSince(start));
+    seconds = std::min(seconds, secondsNow(options.processorTime) - start);
   }
   return sums;
 }
 
 /// The whole picture by one rank, at the first quantum that proves exact.
-Sums drawWhole(Splatter& splatter, int repeats, float firstQuantum, double& seconds) {
-  for (float quantum = firstQuantum;; quantum = nextQuantum(quantum)) {
-    Sums sums = timedDraw(splatter, quantum, {}, repeats, seconds);
+Sums drawWhole(Splatter& splatter, const SpeedupOptions& options, double& seconds) {
+  for (float quantum = options.splat.firstQuantum;; quantum = nextQuantum(quantum)) {
+    Sums sums = timedDraw(splatter, quantum, {}, options, seconds);
     if (sumsAreExact(sums)) return sums;
   }
 }
@@ -215,8 +222,8 @@ class Experiment {
     const std::vector<BlockWork> work = splatter.countWork(view);
     // Once for nothing: memory is there and the clock of the processor up.
     double oneSeconds = 0.0;
-    drawWhole(splatter, 1, options_.splat.firstQuantum, oneSeconds);
-    const Sums whole = drawWhole(splatter, options_.repeats, options_.splat.firstQuantum, oneSeconds);
+    drawWhole(splatter, options_, oneSeconds);
+    const Sums whole = drawWhole(splatter, options_, oneSeconds);
     const std::vector<uint8_t> united = coveredCompositeTiles(whole.image);
     const auto unionTiles = uint64_t(std::count(united.begin(), united.end(), 1));
     uint64_t draws = 0;
@@ -230,7 +237,7 @@ class Experiment {
       uint64_t mostCovered = 0;
       for (int rank = 0; rank < row.ranks; ++rank) {
         const std::vector<uint8_t> share = shareOf(owners[i], rank);
-        const Sums part = timedDraw(splatter, whole.quantum, share, options_.repeats, ofRanks.seconds[size_t(rank)]);
+        const Sums part = timedDraw(splatter, whole.quantum, share, options_, ofRanks.seconds[size_t(rank)]);
         note(splatter, share, work, size_t(rank), ofRanks);
         const std::vector<uint8_t> covered = coveredCompositeTiles(part.image);
         mostCovered = std::max(mostCovered, uint64_t(std::count(covered.begin(), covered.end(), 1)));
@@ -259,8 +266,8 @@ class Experiment {
     Sums whole;
     double oneSeconds = 0.0;
     if (ranks.isRoot()) {
-      drawWhole(splatter, 1, options_.splat.firstQuantum, oneSeconds);
-      whole = drawWhole(splatter, options_.repeats, options_.splat.firstQuantum, oneSeconds);
+      drawWhole(splatter, options_, oneSeconds);
+      whole = drawWhole(splatter, options_, oneSeconds);
     }
     ranks.agree();
     const float quantum = std::stof(ranks.gatherEverywhere(fmt::format("{:a}", whole.quantum))[0]);
@@ -272,11 +279,11 @@ class Experiment {
       for (int repeat = 0; repeat < options_.repeats; ++repeat) {
         Compositor compositor(ranks, view.imageSize, kSumChannels);
         ranks.agree();
-        const auto start = std::chrono::steady_clock::now();
+        const double start = secondsNow(options_.processorTime);
         Sums part = splatter.draw(quantum, share, silentProgress());
-        const double drawn = secondsSince(start);
+        const double drawn = secondsNow(options_.processorTime) - start;
         compositor.add(part.image, exactLimits(quantum));
-        const double frame = secondsSince(start);
+        const double frame = secondsNow(options_.processorTime) - start;
         if (ranks.isRoot()) check(sameBits(part.image, whole.image), "shares add up to the whole picture");
         sentBytes = compositor.traffic().sentBytes;
         drawSeconds = std::min(drawSeconds, drawn);
@@ -467,6 +474,9 @@ Command addSpeedup(CLI::App& program, CommonOptions& common) {
       fmt::format("view directions, 1 to {}: the camera's own, or so many spread over the sphere (default 1)",
                   kMostViews),
       [](std::string_view text) { return int(parseWhole(text, 1, kMostViews)); });
+  addChoice<bool>(*command, "--clock", options->processorTime, {{"wall", false}, {"processor", true}},
+                  "what is measured: time that passes, or time that processors work for this process, which other work "
+                  "on the machine disturbs less; with --threads 1 they should be the same");
   addParsed<int>(*command, "--repeat", options->repeats, "N",
                  fmt::format("draw everything so often and take the least time, 1 to {} (default 1)", kMostRepeats),
                  [](std::string_view text) { return int(parseWhole(text, 1, kMostRepeats)); });

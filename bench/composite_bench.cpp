@@ -1,4 +1,5 @@
-// The composite against one MPI_Reduce of whole images, run under mpirun: interleaved, the sums compared bit by bit first.
+// The composite against one MPI_Reduce of whole images, run under mpirun: interleaved, the sums compared bit by bit
+// first.
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>

@@ -47,6 +47,9 @@ Every command takes `--stats FILE.json` and writes what it did; of these keys th
 | `builds` | of `trace`: how often voxels were stored, 2 if an edit needed others |
 | `frameSeconds`, `framesPerSecond`, `raysPerSecond` | of `trace --turn`: of its views |
 | `frameSeconds` | of `render --frames`: of every picture, writing left out |
+| `sumsHashes` | of `render --sums`: XXH3-64 of the sums of every picture, row by row, channels fastest |
+| `rows` | of `speedup`, one entry per number of ranks, partition and block edge: `ranks`, `partition`, `block`, `blocks`; `balance` (mean over largest splats of a rank, mean over views), `worstBalance` (of the worst view), `balancePieces`, `worstBalancePieces` (of pieces of rays; with `--count` of pixels that blocks cover); seconds of a view: `oneSeconds` (one rank), `slowestSeconds` (the slowest of several), `compositeSeconds`; `sentBytes` (most by a rank); `speedup`, `efficiency`, `speedupWithComposite`, `efficiencyWithComposite` |
+| `real`, `views`, `clock`, `replicatedSeconds`, `compositeRates` | of `speedup`: whether ranks were processes; views; what clock; attenuation and light, which every rank works out alike before it draws, of a view; what the composite of virtual ranks is reckoned with |
 | `partition`, `balance`, `balancePieces` | of several ranks: how blocks were dealt; mean over largest splats, and pieces of rays, of a rank |
 | `ranks` | of several ranks, one entry each: `rank`, `host`, `seconds` (`attenuation`, `light`, `setup`, `draw`, `composite`), `blocks`, `splats`, `fragments`, `pieces`, `sentBytes` (by the composite), `peakMemoryBytes`, all frames together; what stands outside of it are sums (`blocks`, `splats`, `fragments`) or rank 0's |
 | `identical`, `psnr`, `ssim`, `rms`, `maxError`, `differingBytes`, `coveredPixels` | of `compare` |

@@ -139,6 +139,40 @@ TEST_F(RanksOfProgram, UsageIsToldOnce) {
   EXPECT_EQ(result.status, kUsage);
 }
 
+TEST_F(RanksOfProgram, SpeedupOfVirtualAndRealRanks) {
+  const std::string call = std::string("speedup cloud.fvx --json --threads 1 --partition round-robin,random:3") + kView;
+  const nlohmann::json all = nlohmann::json::parse(
+      freevoxelDone(folder, words(call + "--ranks 1,2,5 --block 16,32 --views 2 --plot p.png --plot p.svg")).output);
+  EXPECT_FALSE(all["real"]);
+  ASSERT_EQ(all["rows"].size(), 12u);
+  for (const nlohmann::json& row : all["rows"]) {
+    for (const char* key : {"balance", "worstBalance", "balancePieces", "worstBalancePieces"}) {
+      EXPECT_GT(row[key], 0.0) << key;
+      EXPECT_LE(row[key], 1.0 + 1e-12) << key;
+    }
+    EXPECT_GT(row["speedup"], 0.0);
+    EXPECT_DOUBLE_EQ(row["efficiency"].get<double>() * row["ranks"].get<double>(), row["speedup"].get<double>());
+    EXPECT_LE(row["speedupWithComposite"], row["speedup"]);
+    if (row["ranks"] == 1) {
+      EXPECT_DOUBLE_EQ(row["balance"], 1.0);
+      EXPECT_EQ(row["sentBytes"], 0.0);
+    }
+  }
+  EXPECT_EQ(readBytes(folder + "/p.png").substr(1, 3), "PNG");
+  EXPECT_NE(readBytes(folder + "/p.svg").find("<svg"), std::string::npos);
+
+  const nlohmann::json counted = nlohmann::json::parse(freevoxelDone(folder, words(call + "--ranks 5 --count")).output);
+  EXPECT_DOUBLE_EQ(counted["rows"][0]["balance"], all["rows"][8]["balance"]);
+
+  const ProcessResult real = mpirun(folder, 2, words(call));
+  EXPECT_EQ(real.status, 0) << real.talk;
+  const nlohmann::json rows = nlohmann::json::parse(real.output);
+  EXPECT_TRUE(rows["real"]);
+  ASSERT_EQ(rows["rows"].size(), 2u);
+  EXPECT_EQ(rows["rows"][0]["ranks"], 2);
+  EXPECT_GT(rows["rows"][0]["sentBytes"], 0);
+}
+
 TEST_F(RanksOfProgram, OtherCommandsRunOnce) {
   const ProcessResult one = freevoxel(folder, {"info", "cloud.fvx"});
   const ProcessResult two = mpirun(folder, 2, {"info", "cloud.fvx"});
