@@ -1,4 +1,4 @@
-// freevoxel trace: a picture of a volume in per-voxel lists, by rays.
+// freevoxel trace: a picture of volumes, meshes and spheres in per-voxel lists, by rays.
 #include <fmt/format.h>
 
 #include <chrono>
@@ -10,6 +10,7 @@
 #include "app/light_options.h"
 #include "app/picture_output.h"
 #include "app/scene_file.h"
+#include "app/traced_scene.h"
 #include "base/error.h"
 #include "gl/context.h"
 #include "hierarchy/attenuation_file.h"
@@ -19,13 +20,14 @@
 #include "volume/resample.h"
 #include "volume/transfer_presets.h"
 #include "voxlink/gl_buffers.h"
+#include "voxlink/read_mesh.h"
+#include "voxlink/scene.h"
 #include "voxlink/voxlink.h"
 
 namespace freevoxel {
 
 namespace {
 
-constexpr int kLargestResolution = 4096;
 constexpr int kMostTurnViews = 3600;
 
 struct TraceOptions {
@@ -35,7 +37,8 @@ struct TraceOptions {
   CameraOptions camera;
   LightOptions light;
   VoxLinkOptions voxlink;
-  Shadows shadows = Shadows::attenuation;
+  std::optional<Shadows> shadows;  ///< attenuation of one volume, rays in a scene unless set
+  int maxDepth = SceneVoxLinkOptions().maxDepth;
   Backend backend = Backend::automatic;
   std::optional<int> resolution;
   int turn = 0;
@@ -96,7 +99,8 @@ std::unique_ptr<gl::Context> chooseContext(Backend backend) {
 }
 
 /// The paper's measurement: a full turn about y, then one about x.
-void measureTurns(VoxLink& voxlink, const Camera& camera, int views, Session& session) {
+template <class Tracer>
+void measureTurns(Tracer& voxlink, const Camera& camera, int views, Session& session) {
   nlohmann::ordered_json frames = nlohmann::ordered_json::array();
   double seconds = 0.0;
   for (const glm::dvec3 axis : {glm::dvec3(0.0, 1.0, 0.0), glm::dvec3(1.0, 0.0, 0.0)}) {
@@ -132,11 +136,57 @@ void reportStatistics(const VoxLinkStatistics& done, Session& session) {
   session.statistics["passes"] = done.passes;
 }
 
+void reportStatistics(const SceneVoxLinkStatistics& done, Session& session) {
+  session.addSeconds("build", done.buildSeconds);
+  session.addSeconds("shadows", done.shadowSeconds);
+  session.addSeconds("trace", done.traceSeconds);
+  session.statistics["backend"] = done.backend;
+  if (!done.glRenderer.empty()) session.statistics["glRenderer"] = done.glRenderer;
+  session.statistics["voxels"] = done.voxels;
+  session.statistics["storedVoxels"] = done.storedVoxels;
+  session.statistics["storedFragments"] = done.fragments;
+  session.statistics["bricks"] = done.bricks;
+  session.statistics["occupiedBricks"] = done.occupiedBricks;
+  session.statistics["bufferBytes"] = done.bufferBytes;
+  session.statistics["bytesPerStoredVoxel"] = double(done.bufferBytes) / double(done.storedVoxels);
+  session.statistics["rays"] = done.rays;
+  session.statistics["passes"] = done.passes;
+}
+
+Outcome traceObjects(const TraceOptions& options, const SceneObjects& objects, Session& session) {
+  if (!options.edit.empty()) throw UsageError("--edit is for one volume");
+  const TracedScene scene = readTracedScene(objects, session);
+  const Camera camera = makeCamera(options.camera, sceneBounds(scene));
+  SceneVoxLinkOptions how;
+  how.resolution = options.resolution.value_or(how.resolution);
+  how.brickEdge = options.voxlink.brickEdge;
+  how.threshold = options.voxlink.threshold;
+  how.steps = options.voxlink.steps;
+  how.gpuMemory = options.voxlink.gpuMemory;
+  how.maxDepth = options.maxDepth;
+  const std::unique_ptr<gl::Context> context = chooseContext(options.backend);
+  SceneVoxLink voxlink(scene, how, context.get(), session.progress());
+  voxlink.light(makeLighting(options.light), options.shadows.value_or(Shadows::rays));
+  const Image picture = voxlink.trace(camera, session.progress());
+  reportStatistics(voxlink.statistics(), session);
+  if (options.turn > 0) measureTurns(voxlink, camera, options.turn, session);
+  writePicture(options.picture, picture, session);
+  return Outcome::done;
+}
+
 Outcome trace(TraceOptions options, const CLI::App& command, Session& session) {
   checkOutputName(options.picture);
+  SceneObjects objects;
   if (isSceneFile(options.input)) {
-    useScene(command, {options.input, options.transfer, options.raw, options.camera, options.light, options.picture});
+    useScene(command,
+             {options.input, options.transfer, options.raw, options.camera, options.light, options.picture, &objects});
+  } else if (isMeshFile(options.input) || (isSphereFile(options.input) && !isVolumeArray(options.input))) {
+    if (hasVolumeOptions(options.raw) || !options.transfer.empty()) {
+      throw UsageError("--transfer and options for raw volumes make no sense for meshes and spheres");
+    }
+    objects = sceneOfFile(options.input);
   }
+  if (!objects.empty()) return traceObjects(options, objects, session);
   const TracedVolume traced =
       isAttenuationFile(options.input) ? readFile(options, session) : readVolumeToTrace(options, session);
   const Camera camera = makeCamera(options.camera, worldBounds(traced.grid.placement, traced.grid.dims));
@@ -153,12 +203,19 @@ Outcome trace(TraceOptions options, const CLI::App& command, Session& session) {
   const std::unique_ptr<gl::Context> context = chooseContext(options.backend);
   VoxLink voxlink(traced.grid, traced.transfer, options.voxlink, context.get(), session.progress());
   if (edited) voxlink.edit(traced.grid, *edited, session.progress());
-  voxlink.light(lighting, options.shadows);
+  voxlink.light(lighting, options.shadows.value_or(Shadows::attenuation));
   const Image picture = voxlink.trace(camera, session.progress());
   reportStatistics(voxlink.statistics(), session);
   if (options.turn > 0) measureTurns(voxlink, camera, options.turn, session);
   writePicture(options.picture, picture, session);
   return Outcome::done;
+}
+
+std::optional<Shadows> parseShadows(std::string_view text) {
+  if (text == "rays") return Shadows::rays;
+  if (text == "attenuation") return Shadows::attenuation;
+  if (text == "none") return Shadows::none;
+  throw UsageError(fmt::format("expected rays, attenuation or none, found '{}'", text));
 }
 
 double parseThreshold(std::string_view text) {
@@ -173,29 +230,41 @@ double parseThreshold(std::string_view text) {
 
 Command addTrace(CLI::App& program, CommonOptions& common) {
   auto options = std::make_shared<TraceOptions>();
-  CLI::App* command = addSubcommand(program, "trace", "trace rays through the visible voxels of a volume (VoxLink)",
-                                    "freevoxel trace cloud.nrrd --transfer cloud.json --orbit 30,20 -o cloud.png");
+  CLI::App* command =
+      addSubcommand(program, "trace", "trace rays through voxels of volumes, meshes and spheres (VoxLink)",
+                    "freevoxel trace cloud.nrrd --transfer cloud.json --orbit 30,20 -o cloud.png");
   command
-      ->add_option("INPUT", options->input,
-                   "a volume, which needs --transfer, an attenuation file (.fvx), or a scene (.json)")
+      ->add_option(
+          "INPUT", options->input,
+          "a volume, which needs --transfer, an attenuation file (.fvx), a mesh or spheres (docs/meshes.md), or a "
+          "scene (.json)")
       ->required();
   addOutputOption(*command, options->picture);
   addTransferOption(*command, options->transfer, "; for an attenuation file one of the same range (default: its own)");
   addParsed<std::optional<int>>(
       *command, "--resolution", options->resolution, "N",
-      fmt::format("voxels along the longest edge, 1 to {}: the volume is resampled (default: its own)",
-                  kLargestResolution),
-      [](std::string_view text) { return std::optional<int>(int(parseWhole(text, 1, kLargestResolution))); });
+      fmt::format("voxels along the longest edge, 1 to {}: a volume is resampled (default: its own; of meshes, spheres "
+                  "and several objects {})",
+                  SceneVoxLinkOptions::kMostResolution, SceneVoxLinkOptions().resolution),
+      [](std::string_view text) {
+        return std::optional<int>(int(parseWhole(text, 1, SceneVoxLinkOptions::kMostResolution)));
+      });
   addChoice<int>(*command, "--brick", options->voxlink.brickEdge, {{"4", 4}, {"8", 8}, {"16", 16}},
                  "voxels along the edge of a brick");
   addParsed<double>(
       *command, "--threshold", options->voxlink.threshold, "OPACITY",
       fmt::format("voxels of more opacity are stored, 0 up to below 1 (default {})", options->voxlink.threshold),
       parseThreshold);
-  addChoice<Shadows>(*command, "--shadows", options->shadows,
-                     {{"rays", Shadows::rays}, {"attenuation", Shadows::attenuation}, {"none", Shadows::none}},
-                     "what lamps lose on their way: by a ray from every stored voxel, by attenuation along lattice "
-                     "directions, or nothing");
+  addParsed<std::optional<Shadows>>(
+      *command, "--shadows", options->shadows, "rays|attenuation|none",
+      "what lamps lose on their way: by rays, by attenuation of a volume along lattice directions, or nothing "
+      "(default: "
+      "attenuation for one volume, rays for meshes, spheres and scenes of several objects)",
+      parseShadows);
+  addParsed<int>(*command, "--max-depth", options->maxDepth, "N",
+                 fmt::format("how often a ray may be reflected or refracted, 0 to {} (default {})",
+                             SceneVoxLinkOptions::kMostDepth, options->maxDepth),
+                 [](std::string_view text) { return int(parseWhole(text, 0, SceneVoxLinkOptions::kMostDepth)); });
   command
       ->add_option("--edit", options->edit,
                    "build for --transfer, then show this one: voxels are stored anew only if it shows some that were "
