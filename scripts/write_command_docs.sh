@@ -44,6 +44,8 @@ Every command takes `--stats FILE.json` and writes what it did; of these keys th
 | `quantum`, `passes` | what sums are multiples of; how often the picture was drawn until the sums proved exact; of `trace`, passes of bounded steps |
 | `bricks`, `occupiedBricks` | of `trace`: of the grid over the stored voxels; with a stored voxel |
 | `bufferBytes`, `bytesPerStoredVoxel` | of `trace`: of all buffers that rays read without lamps; divided by `storedVoxels` |
+| `rays`, `storedFragments` | of `trace` with meshes, spheres or several objects: traced for the picture; what is in stored voxels |
+| `nonFiniteVertices`, `nonFiniteTriangles`, `degenerateTriangles`, `linesAndPoints`, `nonFiniteSpheres`, `spheresWithoutRadius` | of the same: left out of what files hold |
 | `builds` | of `trace`: how often voxels were stored, 2 if an edit needed others |
 | `frameSeconds`, `framesPerSecond`, `raysPerSecond` | of `trace --turn`: of its views |
 | `frameSeconds` | of `render --frames`: of every picture, writing left out |
