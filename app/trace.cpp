@@ -39,6 +39,8 @@ struct TraceOptions {
   VoxLinkOptions voxlink;
   std::optional<Shadows> shadows;  ///< attenuation of one volume, rays in a scene unless set
   int maxDepth = SceneVoxLinkOptions().maxDepth;
+  uint64_t rayBuffer = SceneVoxLinkOptions().rayBuffer;
+  bool revoxelise = false;
   Backend backend = Backend::automatic;
   std::optional<int> resolution;
   int turn = 0;
@@ -98,16 +100,16 @@ std::unique_ptr<gl::Context> chooseContext(Backend backend) {
   return context;
 }
 
-/// The paper's measurement: a full turn about y, then one about x.
-template <class Tracer>
-void measureTurns(Tracer& voxlink, const Camera& camera, int views, Session& session) {
+/// The paper's measurement: a full turn about y, then one about x. `drawFrame` is called with each view's camera.
+template <class DrawFrame>
+void measureTurns(const Camera& camera, int views, Session& session, const DrawFrame& drawFrame) {
   nlohmann::ordered_json frames = nlohmann::ordered_json::array();
   double seconds = 0.0;
   for (const glm::dvec3 axis : {glm::dvec3(0.0, 1.0, 0.0), glm::dvec3(1.0, 0.0, 0.0)}) {
     for (int i = 0; i < views; ++i) {
       const Camera view = turned(camera, 2.0 * std::numbers::pi * i / views, axis);
       const auto start = std::chrono::steady_clock::now();
-      voxlink.trace(view, session.progress());
+      drawFrame(view);
       const double frame = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       frames.push_back(frame);
       seconds += frame;
@@ -164,12 +166,18 @@ Outcome traceObjects(const TraceOptions& options, const SceneObjects& objects, S
   how.steps = options.voxlink.steps;
   how.gpuMemory = options.voxlink.gpuMemory;
   how.maxDepth = options.maxDepth;
+  how.rayBuffer = options.rayBuffer;
   const std::unique_ptr<gl::Context> context = chooseContext(options.backend);
   SceneVoxLink voxlink(scene, how, context.get(), session.progress());
   voxlink.light(makeLighting(options.light), options.shadows.value_or(Shadows::rays));
   const Image picture = voxlink.trace(camera, session.progress());
   reportStatistics(voxlink.statistics(), session);
-  if (options.turn > 0) measureTurns(voxlink, camera, options.turn, session);
+  if (options.turn > 0) {
+    measureTurns(camera, options.turn, session, [&](const Camera& view) {
+      if (options.revoxelise) voxlink.update(scene, session.progress());
+      voxlink.trace(view, session.progress());
+    });
+  }
   writePicture(options.picture, picture, session);
   return Outcome::done;
 }
@@ -187,6 +195,7 @@ Outcome trace(TraceOptions options, const CLI::App& command, Session& session) {
     objects = sceneOfFile(options.input);
   }
   if (!objects.empty()) return traceObjects(options, objects, session);
+  if (options.revoxelise) throw UsageError("--revoxelise is for meshes, spheres and scenes of several objects");
   const TracedVolume traced =
       isAttenuationFile(options.input) ? readFile(options, session) : readVolumeToTrace(options, session);
   const Camera camera = makeCamera(options.camera, worldBounds(traced.grid.placement, traced.grid.dims));
@@ -206,7 +215,9 @@ Outcome trace(TraceOptions options, const CLI::App& command, Session& session) {
   voxlink.light(lighting, options.shadows.value_or(Shadows::attenuation));
   const Image picture = voxlink.trace(camera, session.progress());
   reportStatistics(voxlink.statistics(), session);
-  if (options.turn > 0) measureTurns(voxlink, camera, options.turn, session);
+  if (options.turn > 0) {
+    measureTurns(camera, options.turn, session, [&](const Camera& view) { voxlink.trace(view, session.progress()); });
+  }
   writePicture(options.picture, picture, session);
   return Outcome::done;
 }
@@ -286,6 +297,14 @@ Command addTrace(CLI::App& program, CommonOptions& common) {
                              "are in --stats",
                              kMostTurnViews),
                  [](std::string_view text) { return int(parseWhole(text, 1, kMostTurnViews)); });
+  addParsed<uint64_t>(
+      *command, "--ray-buffer", options->rayBuffer, "BYTES",
+      fmt::format("of --gpu-memory for rays of scenes with surfaces, where fewer mean more passes; K, M, "
+                  "G are understood (default {}M)",
+                  options->rayBuffer >> 20),
+      parseBytes);
+  command->add_flag("--revoxelise", options->revoxelise,
+                    "with --turn: meshes and spheres are voxelised anew for every view");
   addBackgroundOption(*command, options->picture);
   addCameraOptions(*command, options->camera);
   addLightOptions(*command, options->light);
