@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -25,31 +24,27 @@ constexpr FixedDepth saturatingSum(FixedDepth a, FixedDepth b) {
   return std::min(a, ~b) + b;
 }
 
-/// 255 * 2^-f for a fraction f of 2^16 in 0..1, to 0.0016: interpolates at both ends and at three points between.
-inline constexpr float kExp2Coefficients[5] = {255.0f, -176.74452209545953f * 0x1p-16f, 61.1046259652167f * 0x1p-32f,
-                                               -13.606555986319323f * 0x1p-48f, 1.7464521165621538f * 0x1p-64f};
-/// Depths from here on, in units of 2^-16 log2, are one: A8 is 0 from 9 log2 on.
-inline constexpr int32_t kLargestCodedDepth = 0xfffff;
+/// Depths from here on, in units of 2^-12 log2, are one: A8 is 0 from 9 log2 on.
+inline constexpr int32_t kLargestCodedDepth = 0xffff;
+/// 2^7 * 255 * 2^-f = c[0] - f (c[1] - f (c[2] - f c[3])) for a fraction f = 0..1, to 2.9: chosen for the smallest error
+/// in the middles of 4096 intervals, products rounded to whole numbers.
+inline constexpr int16_t kExp2Coefficients[4] = {32637, 22573, 7551, 1298};
+inline constexpr int kExp2FractionBits = 7;
 
-/// round(255 * 2^-depth) = A8: the nearest code unless 255 A lies within 0.0045 of the middle between two (the depth is
-/// cut to 2^-16 log2, worth up to 0.0027, and the power is a polynomial). Exact + - * on floats and integers only, so
-/// the same on every machine.
-constexpr uint8_t attenuationCode(FixedDepth depth) {
-  const int32_t coded = std::min(int32_t(depth >> 8), kLargestCodedDepth);
-  const auto f = float(coded & 0xffff);
-  const float(&c)[5] = kExp2Coefficients;
-  const float power = c[0] + f * (c[1] + f * (c[2] + f * (c[3] + f * c[4])));
-  // Divides by 2^(whole part) through the exponent; at least 127.5 * 2^-15 is left, a normal number.
-  const float code = std::bit_cast<float>(std::bit_cast<int32_t>(power) - ((coded >> 16) << 23));
-  return uint8_t(code + 0.5f);  // NOLINT(bugprone-incorrect-roundings): never negative
+/// a * b / 2^15 rounded to the nearest, halves upwards: what processors call a rounding fixed-point product.
+constexpr int32_t fixedProduct(int32_t a, int32_t b) {
+  return (a * b + (1 << 14)) >> 15;
 }
 
-/// depths[i] = table[codes[i]].
-void lookUpDepths(const FixedDepth* table, const uint16_t* codes, size_t count, FixedDepth* depths);
-
-/// depths[i] = table[codes[i] * 256 + nextCodes[i]], both codes up to 255. Where both are below `firstVisible` the
-/// table must hold 0: it is not looked into there.
-void lookUpDepthPairs(const FixedDepth* table, const uint16_t* codes, const uint16_t* nextCodes, size_t count,
-                      uint16_t firstVisible, FixedDepth* depths);
+/// round(255 * 2^-depth) = A8: the nearest code unless 255 A lies within 0.038 of the middle between two (the depth is
+/// cut to 2^-12 log2, worth up to 0.022 either way, and the power is a polynomial). Numbers of 16 bits only, so that
+/// many fit a register, and the same on every machine.
+constexpr uint8_t attenuationCode(FixedDepth depth) {
+  const int32_t coded = std::min(int32_t(depth >> 12), kLargestCodedDepth);
+  const int32_t f = (coded & 0xfff) << 3;
+  const int16_t(&c)[4] = kExp2Coefficients;
+  const int32_t power = c[0] - fixedProduct(f, c[1] - fixedProduct(f, c[2] - fixedProduct(f, c[3])));
+  return uint8_t(((power >> (coded >> 12)) + (1 << (kExp2FractionBits - 1))) >> kExp2FractionBits);
+}
 
 }  // namespace freevoxel

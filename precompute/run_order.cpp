@@ -20,9 +20,9 @@ std::array<RunOrder, kHilbertStateCount> makeRunOrders() {
     const auto curve = hilbertCurve(state, kRunOrder);
     for (size_t step = 0; step < kRunVoxels; ++step) {
       const LocalPosition p = curve[step];
-      order.source[step] = uint8_t(p.y + 4 * (p.x + 4 * p.z));
-      order.octants[step / 8] = uint8_t((p.x / 2) * 2 + p.y / 2 + 4 * (p.z / 2));
-      order.within[step] = uint8_t(step / 8 % 2 * 8 + (p.y & 1u) + 2 * (p.x & 1u) + 4 * (p.z & 1u));
+      order.source[step] = uint8_t(p.x + 4 * (p.y + 4 * p.z));
+      order.octants[step / 8] = uint8_t((p.y / 2) * 2 + p.x / 2 + 4 * (p.z / 2));
+      order.within[step] = uint8_t(step / 8 % 2 * 8 + (p.x & 1u) + 2 * (p.y & 1u) + 4 * (p.z & 1u));
     }
   }
   return orders;

@@ -14,13 +14,13 @@ namespace freevoxel {
 inline constexpr int kRunEdge = 4;
 inline constexpr int kRunVoxels = kRunEdge * kRunEdge * kRunEdge;
 
-/// Order of the 64 voxels of a run for one state of the curve. A voxel's source place is y + 4 * (x + 4 * z).
+/// Order of the 64 voxels of a run for one state of the curve. A voxel's source place is x + 4 * (y + 4 * z).
 struct RunOrder {
   alignas(64) std::array<uint8_t, kRunVoxels> source;  ///< source place of each step along the curve
-  /// The same in two stages: octants of 2^3 in curve order, as (x / 2 * 2 + y / 2) + 4 * (z / 2) ...
+  /// The same in two stages: octants of 2^3 in curve order, as (y / 2 * 2 + x / 2) + 4 * (z / 2) ...
   std::array<uint8_t, 8> octants;
   /// ... then, for each step, the place among the 16 voxels of two successive octants: within one it is
-  /// (y & 1) + 2 * (x & 1) + 4 * (z & 1).
+  /// (x & 1) + 2 * (y & 1) + 4 * (z & 1).
   alignas(64) std::array<uint8_t, kRunVoxels> within;
 };
 

@@ -1,27 +1,39 @@
 #include "precompute/segment_depth.h"
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
+
+#include "precompute/code_table.h"
 
 namespace freevoxel {
 
 namespace {
 
+/// Depth of a segment between two voxels of every code.
+std::vector<FixedDepth> ownDepths(const TransferFunction& transfer, const ValueCoding& coding) {
+  std::vector<FixedDepth> depths(coding.largest + 1);
+  for (uint32_t code = 0; code <= coding.largest; ++code)
+    depths[code] = fixedDepth(transfer.extinctionAt(coding.decode(code)));
+  return depths;
+}
+
 class VoxelSegments final : public SegmentDepth {
  public:
-  VoxelSegments(const TransferFunction& transfer, const ValueCoding& coding) : depths_(coding.largest + 1) {
-    for (uint32_t code = 0; code <= coding.largest; ++code) {
-      depths_[code] = fixedDepth(transfer.extinctionAt(coding.decode(code)));
-    }
-  }
+  VoxelSegments(const TransferFunction& transfer, const ValueCoding& coding) : own_(ownDepths(transfer, coding)) {}
 
-  void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const override {
-    lookUpDepths(depths_.data(), nextCodes.data(), codes.size(), depths);
+  SegmentRule rule() const override { return SegmentRule::neighbour; }
+  void terms(std::span<const uint16_t> codes, const MutableSegmentTerms& rows) const override {
+    own_.row(codes, rows.own);
   }
-  bool isOfNeighbourOnly() const override { return true; }
+  void row(std::span<const uint16_t> /*codes*/, std::span<const uint16_t> nextCodes,
+           FixedDepth* depths) const override {
+    own_.row(nextCodes, depths);
+  }
 
  private:
-  std::vector<FixedDepth> depths_;
+  CodeTable own_;
 };
 
 /// Integral of extinction over code from 0 to every code, in fixed-point units. Three Gauss points on each panel: exact
@@ -56,48 +68,53 @@ std::vector<double> extinctionIntegral(const TransferFunction& transfer, const V
   return integral;
 }
 
+/// The integral as floats whose differences are those between codes. Of up to 256 codes one float is enough: its error
+/// is up to 2^-25 of the whole integral, which is 256 mean extinctions. Of more, the upper half is cut so that its
+/// differences are exact, and the lower half has the rest.
 class PreintegratedSegments final : public SegmentDepth {
  public:
   PreintegratedSegments(const TransferFunction& transfer, const ValueCoding& coding)
-      : integral_(extinctionIntegral(transfer, coding)), own_(coding.largest + 1) {
-    for (uint32_t code = 0; code <= coding.largest; ++code) {
-      own_[code] = fixedDepth(transfer.extinctionAt(coding.decode(code)));
+      : split_(coding.bytes() > 1), ownDepths_(ownDepths(transfer, coding)), own_(ownDepths_) {
+    const std::vector<double> integral = extinctionIntegral(transfer, coding);
+    const double middle = 0.5 * integral.back();
+    int exponent = 0;
+    std::frexp(middle, &exponent);
+    const double unit = std::ldexp(1.0, exponent - std::numeric_limits<float>::digits + 1);
+    for (const double value : integral) {
+      const double upper = split_ ? std::nearbyint((value - middle) / unit) * unit : value - middle;
+      highs_.push_back(float(upper));
+      if (split_) lows_.push_back(float(value - middle - upper));
     }
-    if (coding.bytes() == 1) {
-      pairs_.resize(256 * 256);
-      for (size_t a = 0; a <= coding.largest; ++a) {
-        for (size_t b = 0; b <= coding.largest; ++b)
-          pairs_[a * 256 + b] = segment(a, b);
-      }
-      const auto clear = [&](size_t code) {
-        for (size_t other = 0; other <= code; ++other)
-          if (pairs_[code * 256 + other] != 0 || pairs_[other * 256 + code] != 0) return false;
-        return true;
-      };
-      while (firstVisible_ <= coding.largest && clear(firstVisible_))
-        ++firstVisible_;
-    }
+    high_ = CodeTable(highs_);
+    low_ = CodeTable(lows_);
+  }
+
+  SegmentRule rule() const override { return split_ ? SegmentRule::splitIntegral : SegmentRule::integral; }
+
+  void terms(std::span<const uint16_t> codes, const MutableSegmentTerms& rows) const override {
+    own_.row(codes, rows.own);
+    high_.row(codes, rows.high);
+    if (split_) low_.row(codes, rows.low);
+    std::copy(codes.begin(), codes.end(), rows.code);
   }
 
   void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const override {
-    if (!pairs_.empty()) {
-      lookUpDepthPairs(pairs_.data(), codes.data(), nextCodes.data(), codes.size(), firstVisible_, depths);
-    } else {
-      for (size_t x = 0; x < codes.size(); ++x)
-        depths[x] = segment(codes[x], nextCodes[x]);
-    }
+    for (size_t x = 0; x < codes.size(); ++x)
+      depths[x] = segment(codes[x], nextCodes[x]);
   }
 
  private:
-  FixedDepth segment(size_t a, size_t b) const {
-    if (a == b) return own_[a];
-    return roundedDepth((integral_[b] - integral_[a]) / (double(b) - double(a)));
+  FixedDepth segment(uint16_t a, uint16_t b) const {
+    if (a == b) return ownDepths_[a];
+    float integral = highs_[b] - highs_[a];
+    if (split_) integral += lows_[b] - lows_[a];
+    return FixedDepth(std::lrint(integral / (float(b) - float(a))));
   }
 
-  std::vector<double> integral_;
-  std::vector<FixedDepth> own_;
-  uint16_t firstVisible_ = 0;      ///< segments between codes below are 0
-  std::vector<FixedDepth> pairs_;  ///< segment(a, b) at a * 256 + b, for codes of one byte
+  bool split_;
+  std::vector<FixedDepth> ownDepths_;
+  std::vector<float> highs_, lows_;
+  CodeTable own_, high_, low_;
 };
 
 }  // namespace

@@ -12,20 +12,44 @@
 
 namespace freevoxel {
 
+/// How the segment between two voxels follows from what each contributes, SegmentTerms.
+enum class SegmentRule {
+  /// The neighbour's own depth.
+  neighbour,
+  /// (high' - high) / (code' - code) rounded to the nearest, for equal codes own; all in float.
+  integral,
+  /// (high' - high + (low' - low)) / (code' - code) likewise.
+  splitIntegral,
+};
+
+/// What voxels contribute to the segments that they are ends of, one entry a voxel.
+template <class Depth, class Float>
+struct SegmentTermRows {
+  Depth* own = nullptr;
+  // Of the integral rules only; low of splitIntegral.
+  Float* code = nullptr;
+  Float* high = nullptr;
+  Float* low = nullptr;
+};
+using SegmentTerms = SegmentTermRows<const FixedDepth, const float>;
+using MutableSegmentTerms = SegmentTermRows<FixedDepth, float>;
+
 /// What light loses between a voxel and its neighbour towards the outside. Each segment counts as one edge long
-/// whatever its direction: the length is restored where A is looked up (A^l).
+/// whatever its direction: the length is restored where A is looked up (A^l). Const and safe to call from many threads.
 class SegmentDepth {
  public:
   virtual ~SegmentDepth() = default;
-  /// depths[x] = segment(codes[x], nextCodes[x]); all three of one size. Const and safe to call from many threads.
+  virtual SegmentRule rule() const = 0;
+  /// Fills the rows that the rule asks for.
+  virtual void terms(std::span<const uint16_t> codes, const MutableSegmentTerms& rows) const = 0;
+  /// depths[x] = segment(codes[x], nextCodes[x]); all three of one size.
   virtual void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const = 0;
-  /// Whether `codes` make no difference, so that one look-up per voxel serves all directions.
-  virtual bool isOfNeighbourOnly() const { return false; }
 };
 
 /// `voxel`: the neighbour's own depth, so that A8 is the product of T over the voxels strictly between (Eq. 5).
 /// `preintegrated`: mean extinction along the straight line between the two values (Eq. 4 with values interpolated
-/// before they are classified; K. Engel et al., Pre-integrated Volume Rendering, 2001). Symmetric in its arguments.
+/// before they are classified; K. Engel et al., Pre-integrated Volume Rendering, 2001). Symmetric in its arguments. Off
+/// by rounding to 2^-24 of itself and, for codes of one byte, by up to 2^-17 of the mean extinction over all codes.
 std::unique_ptr<SegmentDepth> makeSegmentDepth(Classification classification, const TransferFunction& transfer,
                                                const ValueCoding& coding);
 

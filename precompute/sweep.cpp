@@ -36,7 +36,7 @@ class Rows {
   std::vector<Line> lines_;
 };
 
-/// Sizes that everything here shares.
+/// Sizes that everything here shares. A strip is four rows of voxels, all of x, in every plane of a slab.
 struct Shape {
   glm::ivec3 dims;
   int edge;
@@ -46,10 +46,13 @@ struct Shape {
         edge(brickEdge),
         width((volumeDims.x + std::max(brickEdge, kRowUnit) - 1) / std::max(brickEdge, kRowUnit) *
               std::max(brickEdge, kRowUnit)) {}
-  int strips() const { return (dims.y + edge - 1) / edge; }
+  int runsPerEdge() const { return edge / kRunEdge; }
+  int brickRows() const { return (dims.y + edge - 1) / edge; }
+  int strips() const { return brickRows() * runsPerEdge(); }
   int slabs() const { return (dims.z + edge - 1) / edge; }
   int slabPlanes(int slab) const { return std::min(edge, dims.z - slab * edge); }
-  int stripRows(int strip) const { return std::min(edge, dims.y - strip * edge); }
+  /// Rows inside the volume.
+  int stripRows(int strip) const { return std::clamp(dims.y - strip * kRunEdge, 0, kRunEdge); }
 };
 
 /// Codes of a slab and of the plane upstream of it.
@@ -58,52 +61,90 @@ struct CodeSlab {
   int first = 0;
 };
 
-/// The strips of a slab, each with the bricks that are wanted.
+/// The bricks of a slab that are wanted, row by row.
 struct SlabBricks {
-  struct Brick {
-    int x;  ///< first voxel
-    const BrickRun* runs;
-    uint8_t* planes;
-  };
-  std::vector<std::vector<Brick>> strips;
-  std::vector<std::vector<StripPart>> parts;  ///< merged
+  std::vector<std::vector<BrickRow>> rows;
+  std::vector<std::vector<uint8_t>> wanted;  ///< of each row, for each kRowUnit voxels: whether a brick lies there
 };
 
 SlabBricks sortBricks(const Shape& shape, std::span<const BrickPlanes> bricks) {
   SlabBricks slab;
-  slab.strips.resize(size_t(shape.strips()));
-  slab.parts.resize(size_t(shape.strips()));
+  slab.rows.resize(size_t(shape.brickRows()));
+  slab.wanted.assign(size_t(shape.brickRows()), std::vector<uint8_t>(size_t(shape.width / kRowUnit)));
   const int brickOrder = std::countr_zero(unsigned(shape.edge));
   for (const BrickPlanes& brick : bricks) {
-    slab.strips[size_t(brick.position.y)].push_back(
-        {brick.position.x * shape.edge, brickRuns(brick.hilbertState, brickOrder).data(), brick.planes});
+    const int x = brick.position.x * shape.edge;
+    const auto row = size_t(brick.position.y);
+    slab.rows[row].push_back({x, brickRuns(brick.hilbertState, brickOrder).data(), brick.planes});
+    for (int voxel = x; voxel < x + shape.edge; voxel += kRunEdge)
+      slab.wanted[row][size_t(voxel / kRowUnit)] = 1;
   }
-  for (size_t strip = 0; strip < slab.strips.size(); ++strip) {
-    std::sort(slab.strips[strip].begin(), slab.strips[strip].end(),
-              [](const SlabBricks::Brick& a, const SlabBricks::Brick& b) { return a.x < b.x; });
-    auto& parts = slab.parts[strip];
-    for (const SlabBricks::Brick& brick : slab.strips[strip]) {
-      const int first = brick.x / kRowUnit * kRowUnit;
-      const int last = (brick.x + shape.edge + kRowUnit - 1) / kRowUnit * kRowUnit;
-      if (!parts.empty() && parts.back().last >= first) {
-        parts.back().last = last;
-      } else {
-        parts.push_back({first, last});
-      }
-    }
-  }
+  for (auto& row : slab.rows)
+    std::sort(row.begin(), row.end(), [](const BrickRow& a, const BrickRow& b) { return a.x < b.x; });
   return slab;
 }
 
+/// What voxels contribute to segments: of a strip, the rows beside it and the plane before, in the order of the sweep.
+class StripTerms {
+ public:
+  StripTerms(const Shape& shape, SegmentRule rule) : zeros_(1, shape.width) {
+    const int rows = (shape.edge + 1) * kRows;
+    own_ = Rows(rows, shape.width);
+    if (rule == SegmentRule::neighbour) return;
+    code_ = Rows(rows, shape.width);
+    high_ = Rows(rows, shape.width);
+    if (rule == SegmentRule::splitIntegral) low_ = Rows(rows, shape.width);
+  }
+
+  /// Fills a plane. `place` counts planes from the one before the slab, which is 0.
+  void fill(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int place, int z, int strip) {
+    for (int y = -1; y <= kRunEdge; ++y) {
+      const glm::ivec3 first(0, strip * kRunEdge + y, z);
+      if (first.y < 0 || first.y >= shape.dims.y || z < 0 || z >= shape.dims.z) continue;
+      const uint16_t* row = codes.codes + linearIndex(first - glm::ivec3(0, 0, codes.first), shape.dims);
+      const int at = index(place, y);
+      segments.terms({row, size_t(shape.dims.x)}, {own_.row(at), floats(code_, at), floats(high_, at), floats(low_, at)});
+    }
+  }
+
+  /// Row y of the strip, -1..kRunEdge.
+  SegmentTerms row(int place, int y) {
+    const int at = index(place, y);
+    return {own_.row(at), floats(code_, at), floats(high_, at), floats(low_, at)};
+  }
+  /// A row outside the volume.
+  SegmentTerms nothing() {
+    const auto* zeros = reinterpret_cast<const float*>(zeros_.row(0));
+    return {zeros_.row(0), zeros, zeros, zeros};
+  }
+  const FixedDepth* noDepths() { return zeros_.row(0); }
+
+ private:
+  static constexpr int kRows = kRunEdge + 2;
+  static int index(int place, int y) { return place * kRows + 1 + y; }
+  static float* floats(Rows& rows, int row) {
+    return rows.stride() == 0 ? nullptr : reinterpret_cast<float*>(rows.row(row));
+  }
+
+  Rows own_, code_, high_, low_, zeros_;
+};
+
 /// What a thread needs for the strip at hand.
 struct Scratch {
-  explicit Scratch(const Shape& shape, bool shared)
-      : segments(shared ? (shape.edge + 1) * (shape.edge + 2) : shape.edge, shape.width),
-        words(size_t(kRunEdge) * size_t(shape.edge / kRunEdge) * size_t(shape.width)) {}
-  /// If segments depend on the neighbour only: those to every voxel of the strip and of the rows and the plane around
-  /// it, in the order of the sweep. Else those of one plane.
+  Scratch(const Shape& shape, SegmentRule rule)
+      : terms(shape, rule), segments(1, shape.width), bytes(kRunEdge, shape.width) {}
+  StripTerms terms;
   Rows segments;
-  std::vector<uint32_t> words;  ///< four planes of a strip, as codeStrip makes them
+  Rows bytes;  ///< four planes of a strip: see TilePlane::bytes
+};
+
+/// Where a strip of a slab is, and how far its sweep has come.
+struct TilePlace {
+  int slab, strip;
+  int runZ;       ///< of the four planes at hand
+  int done;       ///< planes of the slab that are behind, all inside the volume
+  int planes;     ///< of the four that are inside the volume
+  int firstZ;     ///< of these, the first in the order of the sweep
 };
 
 /// Depths along one direction, kept from plane to plane and from strip to strip.
@@ -112,150 +153,128 @@ class DirectionSweep {
   DirectionSweep(int direction, const Shape& shape)
       : direction_(direction),
         step_(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction)),
-        state_(step_.z != 0 ? shape.strips() * shape.edge : shape.edge, shape.width) {
+        state_(step_.z != 0 ? shape.strips() * kRunEdge : kRunEdge, shape.width) {
     if (step_.y == 0) return;
     for (Rows& rows : edges_)
       rows = Rows(shape.edge + 1, shape.width);
   }
 
-  int direction() const { return direction_; }
   glm::ivec3 step() const { return step_; }
 
-  /// All planes of a strip. Strips come from the outside inwards: ascending where the direction points down in y,
-  /// descending where it points up.
-  void sweepStrip(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int slab, int strip,
-                  const SlabBricks& bricks, Scratch& scratch) {
-    const int rows = shape.stripRows(strip);
-    const int planes = shape.slabPlanes(slab);
-    FixedDepth* state = state_.row(step_.z != 0 ? strip * shape.edge : 0);
-    if (step_.z == 0) {
-      for (int y = rows; y < shape.edge; ++y)
-        std::fill_n(state + size_t(y) * state_.stride(), shape.width, 0);
+  /// Before the first tile of a strip. Strips come from the outside inwards: ascending where the direction points down
+  /// in y, descending where it points up.
+  void beginStrip(const Shape& shape, int strip) {
+    if (step_.y == 0 || step_.z == 0) return;
+    std::memcpy(edges_[1].row(0), stripState(strip) + size_t(leavingRow()) * state_.stride(),
+                size_t(shape.width) * sizeof(FixedDepth));
+  }
+
+  /// After its last tile.
+  void endStrip() { std::swap(edges_[0], edges_[1]); }
+
+  /// Four planes of a strip: their bytes go to the bricks.
+  void sweep(const Shape& shape, SegmentRule rule, const TilePlace& place, const SlabBricks& bricks, Scratch& scratch) {
+    const auto brickRow = size_t(place.strip / shape.runsPerEdge());
+    auto* const bytes = reinterpret_cast<uint8_t*>(scratch.bytes.row(0));
+    const size_t planeBytes = scratch.bytes.stride() * sizeof(FixedDepth);
+    const int rows = shape.stripRows(place.strip);
+    if (place.planes < kRunEdge || rows == 0) {
+      std::memset(bytes, kAttenuationOutside, (kRunEdge - 1) * planeBytes + size_t(shape.width) * kRunEdge);
     }
-    const bool up = sweepPass(direction_) == 0;
-    int done = 0;  // planes inside the volume
-    const auto rowBytes = size_t(shape.width) * sizeof(FixedDepth);
-    const FixedDepth* leaving = state + size_t(step_.y > 0 ? 0 : rows - 1) * state_.stride();
-    if (step_.y != 0) std::memcpy(edges_[1].row(0), leaving, rowBytes);
-    const size_t planeWords = scratch.words.size() / kRunEdge;
-    const auto& parts = bricks.parts[size_t(strip)];
-    for (int i = 0; i < shape.edge; ++i) {
-      const int local = up ? i : shape.edge - 1 - i;
-      uint32_t* words = scratch.words.data() + size_t(local % kRunEdge) * planeWords;
-      if (local >= planes) {
-        std::fill_n(words, planeWords, ~0u);
-      } else {
-        sweepPlane(shape, segments, codes, slab, strip, local, done, state, scratch);
-        ++done;
-        if (step_.y != 0) std::memcpy(edges_[1].row(done), leaving, rowBytes);
-        codeStrip(state, state_.stride(), shape.edge, shape.width, parts, words);
-      }
-      if (i % kRunEdge == kRunEdge - 1) storePlanes(shape, bricks.strips[size_t(strip)], local / kRunEdge, scratch);
+    if (place.planes > 0 && rows > 0) {
+      Tile tile;
+      tile.rule = rule;
+      tile.state = stripState(place.strip);
+      tile.stride = state_.stride();
+      tile.width = shape.width;
+      tile.voxels = shape.dims.x;
+      tile.stepX = step_.x;
+      tile.stepY = step_.y;
+      tile.samePlane = step_.z == 0;
+      tile.leavingRow = leavingRow();
+      tile.wanted = bricks.wanted[brickRow].data();
+      tile.segments = scratch.segments.row(0);
+      tile.planeCount = place.planes;
+      for (int i = 0; i < place.planes; ++i)
+        tile.planes[size_t(i)] = plane(shape, place, i, scratch, bytes, planeBytes);
+      sweepTile(tile);
     }
-    std::swap(edges_[0], edges_[1]);
+    const auto runs = size_t(shape.runsPerEdge());
+    const size_t brickVoxels = size_t(shape.edge) * size_t(shape.edge) * size_t(shape.edge);
+    storeRuns(bytes, planeBytes, bricks.rows[brickRow],
+              (size_t(place.runZ) * runs + size_t(place.strip) % runs) * runs, int(runs),
+              size_t(direction_ % kDirectionsPerSection) * brickVoxels);
   }
 
  private:
-  /// `done`: planes of the slab that are behind, all inside the volume.
-  void sweepPlane(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int slab, int strip,
-                  int local, int done, FixedDepth* state, Scratch& scratch) {
-    const int z = slab * shape.edge + local;
-    const int firstRow = strip * shape.edge;
-    StripUpdate update;
-    update.state = state;
-    update.stride = state_.stride();
-    update.rows = shape.stripRows(strip);
-    update.width = shape.width;
-    update.voxels = shape.dims.x;
-    update.stepX = step_.x;
-    update.stepY = step_.y;
-    update.samePlane = step_.z == 0;
-    if (z + step_.z < 0 || z + step_.z >= shape.dims.z) {
-      for (int y = 0; y < update.rows; ++y)
-        std::fill_n(state + size_t(y) * update.stride, shape.width, 0);
-      return;
-    }
-    const int beyond = step_.y > 0 ? firstRow + update.rows : firstRow - 1;
-    if (step_.y != 0 && beyond >= 0 && beyond < shape.dims.y) {
-      update.upstream = edges_[0].row(step_.z != 0 ? done : done + 1);
-    }
-    update.segmentStride = scratch.segments.stride();
-    if (segments.isOfNeighbourOnly()) {
-      const int plane = step_.z != 0 ? done : done + 1;
-      update.segments = scratch.segments.row(plane * (shape.edge + 2) + 1 + step_.y) + step_.x;
-    } else {
-      classifySegments(shape, segments, codes, z, firstRow, update.rows, scratch.segments);
-      update.segments = scratch.segments.row(0);
-    }
-    updateStrip(update);
-  }
+  FixedDepth* stripState(int strip) { return state_.row(step_.z != 0 ? strip * kRunEdge : 0); }
+  int leavingRow() const { return step_.y > 0 ? 0 : kRunEdge - 1; }
 
-  void classifySegments(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int z, int firstRow,
-                        int rows, Rows& out) const {
-    const int first = std::max(0, -step_.x);
-    const int last = shape.dims.x - std::max(0, step_.x);
-    for (int y = 0; y < rows; ++y) {
-      const int nextY = firstRow + y + step_.y;
-      if (nextY < 0 || nextY >= shape.dims.y) continue;
-      FixedDepth* row = out.row(y);
-      row[0] = row[shape.dims.x - 1] = 0;
-      if (first >= last) continue;
-      const auto count = size_t(last - first);
-      const uint16_t* own = codes.codes + linearIndex({first, firstRow + y, z - codes.first}, shape.dims);
-      const uint16_t* next = codes.codes + linearIndex({first + step_.x, nextY, z + step_.z - codes.first}, shape.dims);
-      segments.row({own, count}, {next, count}, row + first);
+  TilePlane plane(const Shape& shape, const TilePlace& place, int i, Scratch& scratch, uint8_t* bytes,
+                  size_t planeBytes) {
+    const int z = place.firstZ - i * zOrder(), done = place.done + i;
+    const int neighbourPlace = step_.z != 0 ? done : done + 1;
+    const bool planeOutside = z + step_.z < 0 || z + step_.z >= shape.dims.z;
+    FixedDepth* const state = stripState(place.strip);
+    TilePlane plane;
+    for (int y = 0; y < kRunEdge; ++y) {
+      const auto row = size_t(y);
+      const int volumeY = place.strip * kRunEdge + y, nextY = volumeY + step_.y;
+      if (planeOutside || volumeY >= shape.dims.y || nextY < 0 || nextY >= shape.dims.y) {
+        plane.next[row] = scratch.terms.noDepths();
+        plane.own[row] = plane.neighbour[row] = scratch.terms.nothing();
+        continue;
+      }
+      const bool beyond = y + step_.y < 0 || y + step_.y >= kRunEdge;
+      plane.next[row] = beyond ? edges_[0].row(neighbourPlace) : state + ptrdiff_t(y + step_.y) * ptrdiff_t(state_.stride());
+      plane.own[row] = scratch.terms.row(done + 1, y);
+      plane.neighbour[row] = scratch.terms.row(neighbourPlace, y + step_.y);
     }
+    if (step_.y != 0) plane.leaving = edges_[1].row(done + 1);
+    plane.bytes = bytes + size_t(z % shape.edge % kRunEdge) * planeBytes;
+    return plane;
   }
-
-  void storePlanes(const Shape& shape, const std::vector<SlabBricks::Brick>& bricks, int runZ,
-                   const Scratch& scratch) const {
-    const int runs = shape.edge / kRunEdge;
-    const size_t brickVoxels = size_t(shape.edge) * size_t(shape.edge) * size_t(shape.edge);
-    const size_t plane = size_t(direction_ % kDirectionsPerSection) * brickVoxels;
-    for (const SlabBricks::Brick& brick : bricks) {
-      storeRuns(scratch.words.data() + brick.x, scratch.words.size() / kRunEdge, shape.width,
-                brick.runs + size_t(runZ) * size_t(runs) * size_t(runs), runs, brick.planes + plane);
-    }
-  }
+  int zOrder() const { return sweepPass(direction_) == 0 ? -1 : 1; }
 
   int direction_;
   glm::ivec3 step_;
-  Rows state_;                 ///< of the plane; where the direction lies in the plane, of a strip
-  std::array<Rows, 2> edges_;  ///< of the strip upstream and of this one: the row next to the strip downstream, before
-                               ///< the slab and after each of its planes
+  /// Of the plane before, or of a strip of this one if the direction stays in its plane.
+  Rows state_;
+  /// The rows through which rays come in from the strip before, and those through which they leave this one: before the
+  /// first plane of the slab, and after each.
+  Rows edges_[2];
 };
 
-/// Directions of one pass whose strips can be swept in the same order, so that they share what depends on voxels only.
+/// Directions that one thread sweeps together: all strips of a slab, in one order.
 struct SweepGroup {
-  int pass = 0;
-  bool ascending = true;
+  int pass;
+  bool ascending;
   std::vector<DirectionSweep> sweeps;
 
   void sweepSlab(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int slab,
                  const SlabBricks& bricks, Scratch& scratch) {
+    const int planes = shape.slabPlanes(slab), first = slab * shape.edge;
+    const int beforeZ = pass == 0 ? first - 1 : first + planes;
     for (int i = 0; i < shape.strips(); ++i) {
       const int strip = ascending ? i : shape.strips() - 1 - i;
-      if (segments.isOfNeighbourOnly()) classifyStrip(shape, segments, codes, slab, strip, scratch.segments);
+      scratch.terms.fill(shape, segments, codes, 0, beforeZ, strip);
       for (DirectionSweep& sweep : sweeps)
-        sweep.sweepStrip(shape, segments, codes, slab, strip, bricks, scratch);
+        sweep.beginStrip(shape, strip);
+      TilePlace place{slab, strip, 0, 0, 0, 0};
+      for (int run = 0; run < shape.runsPerEdge(); ++run) {
+        place.runZ = pass == 0 ? run : shape.runsPerEdge() - 1 - run;
+        place.planes = std::clamp(planes - place.runZ * kRunEdge, 0, kRunEdge);
+        place.firstZ = first + place.runZ * kRunEdge + (pass == 0 ? 0 : place.planes - 1);
+        for (int p = 0; p < place.planes; ++p)
+          scratch.terms.fill(shape, segments, codes, place.done + p + 1, place.firstZ + (pass == 0 ? p : -p), strip);
+        for (DirectionSweep& sweep : sweeps)
+          sweep.sweep(shape, segments.rule(), place, bricks, scratch);
+        place.done += place.planes;
+      }
+      for (DirectionSweep& sweep : sweeps)
+        sweep.endStrip();
     }
     finishStores();
-  }
-
- private:
-  void classifyStrip(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int slab, int strip,
-                     Rows& out) const {
-    const int planes = shape.slabPlanes(slab);
-    const int firstRow = strip * shape.edge;
-    const auto count = size_t(shape.dims.x);
-    for (int i = 0; i <= planes; ++i) {
-      const int z = slab * shape.edge + (pass == 0 ? i - 1 : planes - i);
-      if (z < 0 || z >= shape.dims.z) continue;
-      for (int y = std::max(firstRow - 1, 0); y < std::min(firstRow + shape.edge + 1, shape.dims.y); ++y) {
-        const uint16_t* row = codes.codes + linearIndex({0, y, z - codes.first}, shape.dims);
-        segments.row({row, count}, {row, count}, out.row(i * (shape.edge + 2) + 1 + y - firstRow));
-      }
-    }
   }
 };
 
@@ -303,7 +322,7 @@ void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const Segmen
   std::vector<SweepGroup> groups = makeGroups(shape, passes, threads);
   std::vector<Scratch> scratches;
   for (int i = 0; i < threads; ++i)
-    scratches.emplace_back(shape, segments.isOfNeighbourOnly());
+    scratches.emplace_back(shape, segments.rule());
 
   // Both passes run at once, one from each end.
   for (int step = 0; step < shape.slabs(); ++step) {
@@ -342,8 +361,8 @@ uint64_t sweepBytes(glm::ivec3 dims, int edge, int passCount, int threads) {
   const Shape shape(dims, edge);
   const uint64_t rowBytes = (uint64_t(shape.width) + 2 * kRowUnit) * sizeof(FixedDepth);
   const auto e = uint64_t(edge);
-  const uint64_t directionRows = 9 * uint64_t(shape.strips()) * e + 4 * e + 11 * 2 * (e + 1);
-  const uint64_t threadRows = (e + 1) * (e + 2) + e;
+  const uint64_t directionRows = 9 * uint64_t(shape.strips()) * kRunEdge + 4 * kRunEdge + 9 * 2 * (e + 1);
+  const uint64_t threadRows = 4 * (e + 1) * (kRunEdge + 2) + kRunEdge + 2;
   return rowBytes * (uint64_t(passCount) * directionRows + uint64_t(threads) * threadRows);
 }
 

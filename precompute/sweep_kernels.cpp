@@ -20,22 +20,180 @@ namespace hn = hwy::HWY_NAMESPACE;
 using Tag = hn::CappedTag<uint32_t, kRowUnit>;
 using Depths = hn::Vec<Tag>;
 
-HWY_INLINE Depths sum(Depths a, Depths b) {
-  return hn::Min(hn::Add(a, b), hn::Set(Tag(), kLargestKeptDepth));
+HWY_INLINE Depths kept(Depths depths) {
+  return hn::Min(depths, hn::Set(Tag(), kLargestKeptDepth));
 }
 
-/// `depths` may be `next` less stepX.
-HWY_INLINE void addRow(const FixedDepth* next, const FixedDepth* segments, int width, bool descending,
-                       FixedDepth* depths) {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+
+HWY_INLINE Depths meanOrOwn(hn::Vec<hn::RebindToFloat<Tag>> integral, hn::Vec<hn::RebindToFloat<Tag>> codes,
+                            Depths own) {
+  const __mmask16 differ = _mm512_cmp_ps_mask(codes.raw, _mm512_setzero_ps(), _CMP_NEQ_OQ);
+  const __m512 mean = _mm512_maskz_div_ps(differ, integral.raw, codes.raw);
+  return Depths{_mm512_mask_cvtps_epi32(own.raw, differ, mean)};
+}
+
+#else
+
+template <class Floats>
+HWY_INLINE Depths meanOrOwn(Floats integral, Floats codes, Depths own) {
+  const hn::RebindToFloat<Tag> floats;
+  const auto same = hn::Eq(codes, hn::Zero(floats));
+  const auto mean = hn::Div(integral, hn::IfThenElse(same, hn::Set(floats, 1.0f), codes));
+  return hn::IfThenElse(hn::RebindMask(Tag(), same), own, hn::BitCast(Tag(), hn::NearestInt(mean)));
+}
+
+#endif
+
+/// Segments from voxels x, x + 1, .. to their neighbours, where these lie in the volume.
+template <SegmentRule rule>
+HWY_INLINE Depths segmentsFrom(const SegmentTerms& own, const SegmentTerms& neighbour, ptrdiff_t x, int stepX) {
   const Tag tag;
-  const auto lanes = ptrdiff_t(hn::Lanes(tag));
+  const hn::RebindToFloat<Tag> floats;
+  const ptrdiff_t next = x + stepX;
+  if constexpr (rule == SegmentRule::neighbour) {
+    return hn::LoadU(tag, neighbour.own + next);
+  } else {
+    const auto difference = [&](const float* from, const float* to) {
+      return hn::Sub(hn::LoadU(floats, to + next), hn::LoadU(floats, from + x));
+    };
+    auto integral = difference(own.high, neighbour.high);
+    if constexpr (rule == SegmentRule::splitIntegral) {
+      integral = hn::Add(integral, difference(own.low, neighbour.low));
+    }
+    return meanOrOwn(integral, difference(own.code, neighbour.code), hn::LoadU(tag, own.own + x));
+  }
+}
+
+/// Zero for voxels that lie outside the volume, or whose neighbours do.
+HWY_INLINE Depths insideOnly(Depths depths, const Tile& tile, ptrdiff_t x) {
+  const Tag tag;
+  const hn::RebindToSigned<Tag> integers;
+  const auto at = hn::Iota(integers, int32_t(x));
+  const int32_t first = tile.stepX < 0 ? 1 : 0, last = tile.voxels - 1 - (tile.stepX > 0 ? 1 : 0);
+  const auto outside = hn::Or(hn::Lt(at, hn::Set(integers, first)), hn::Gt(at, hn::Set(integers, last)));
+  return hn::IfThenElse(hn::RebindMask(tag, outside), hn::Zero(tag), depths);
+}
+
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
+
+#if HWY_TARGET <= HWY_AVX3
+HWY_INLINE __m512i packed32(__m512i a, __m512i b) {
+  return _mm512_packus_epi32(a, b);
+}
+HWY_INLINE __m512i packed16(__m512i a, __m512i b) {
+  return _mm512_packus_epi16(a, b);
+}
+#elif HWY_TARGET == HWY_AVX2
+HWY_INLINE __m256i packed32(__m256i a, __m256i b) {
+  return _mm256_packus_epi32(a, b);
+}
+HWY_INLINE __m256i packed16(__m256i a, __m256i b) {
+  return _mm256_packus_epi16(a, b);
+}
+#else
+HWY_INLINE __m128i packed32(__m128i a, __m128i b) {
+  return _mm_packus_epi32(a, b);
+}
+HWY_INLINE __m128i packed16(__m128i a, __m128i b) {
+  return _mm_packus_epi16(a, b);
+}
+#endif
+
+using WordTag = hn::Repartition<uint16_t, Tag>;
+using Words = hn::Vec<WordTag>;
+
+/// attenuationCode of depths in units of 2^-12 log2.
+HWY_INLINE Words codesOf(Words coded) {
+  const WordTag words;
+  const hn::RebindToSigned<WordTag> numbers;
+  const auto coefficient = [&](int i) { return hn::Set(numbers, kExp2Coefficients[i]); };
+  const auto f = hn::BitCast(numbers, hn::And(hn::ShiftLeft<3>(coded), hn::Set(words, 0x7ff8)));
+  auto power = hn::Sub(coefficient(2), hn::MulFixedPoint15(f, coefficient(3)));
+  power = hn::Sub(coefficient(1), hn::MulFixedPoint15(f, power));
+  power = hn::Sub(coefficient(0), hn::MulFixedPoint15(f, power));
+  const auto whole = hn::ShiftRight<12>(coded);
+#if HWY_TARGET <= HWY_AVX3
+  // 2^(8 - whole): the product is the power shifted and rounded.
+  alignas(64) static constexpr int16_t kScales[32] = {256, 128, 64, 32, 16, 8, 4, 2, 1};
+  static_assert(kExp2FractionBits == 7);
+  const hn::Vec<hn::RebindToSigned<WordTag>> scales{
+      _mm512_permutexvar_epi16(whole.raw, _mm512_load_si512(kScales))};
+  return hn::BitCast(words, hn::MulFixedPoint15(power, scales));
+#else
+  const auto half = hn::Set(words, 1u << (kExp2FractionBits - 1));
+  return hn::ShiftRight<kExp2FractionBits>(hn::Add(hn::BitCast(words, power) >> whole, half));
+#endif
+}
+
+/// Bytes of four rows at x, as TilePlane::bytes has them.
+HWY_INLINE void codeRows(const Depths (&rows)[kRunEdge], ptrdiff_t x, uint8_t* bytes) {
+  const hn::Repartition<uint8_t, Tag> tag;
+  const auto pair = [&](Depths a, Depths b) {
+    return codesOf(Words{packed32(hn::ShiftRight<12>(a).raw, hn::ShiftRight<12>(b).raw)});
+  };
+  const hn::Vec<decltype(tag)> codes{packed16(pair(rows[0], rows[1]).raw, pair(rows[2], rows[3]).raw)};
+  hn::StoreU(codes, tag, bytes + kRunEdge * x);
+}
+
+#else
+
+HWY_INLINE void codeRows(const Depths (&rows)[kRunEdge], ptrdiff_t x, uint8_t* bytes) {
+  const Tag tag;
+  HWY_ALIGN FixedDepth depths[kRowUnit];
+  for (int row = 0; row < kRunEdge; ++row) {
+    hn::Store(rows[row], tag, depths);
+    for (ptrdiff_t i = 0; i < ptrdiff_t(hn::Lanes(tag)); ++i)
+      bytes[kRunEdge * ((x + i) & ~ptrdiff_t(3)) + 4 * row + ((x + i) & 3)] = attenuationCode(depths[i]);
+  }
+}
+
+#endif
+
+/// Calls f(x) for all vectors of a row. Where a row is renewed in place from the neighbour after, it goes upwards, from
+/// the one before downwards.
+template <class F>
+HWY_INLINE void forRow(int width, bool descending, F&& f) {
+  const auto lanes = ptrdiff_t(hn::Lanes(Tag()));
   if (descending) {
     for (ptrdiff_t x = width - lanes; x >= 0; x -= lanes)
-      hn::StoreU(sum(hn::LoadU(tag, next + x), hn::LoadU(tag, segments + x)), tag, depths + x);
+      f(x);
   } else {
     for (ptrdiff_t x = 0; x < width; x += lanes)
-      hn::StoreU(sum(hn::LoadU(tag, next + x), hn::LoadU(tag, segments + x)), tag, depths + x);
+      f(x);
   }
+}
+
+/// One plane from the plane before.
+template <SegmentRule rule, bool cut>
+HWY_INLINE void renewPlane(const Tile& tile, const TilePlane& plane) {
+  const Tag tag;
+  const auto lanes = ptrdiff_t(hn::Lanes(tag));
+  const ptrdiff_t firstInside = tile.stepX < 0 ? 1 : 0, lastInside = tile.voxels - (tile.stepX > 0 ? 1 : 0);
+  const std::array<const FixedDepth*, kRunEdge> next = plane.next;
+  const std::array<SegmentTerms, kRunEdge> own = plane.own, neighbour = plane.neighbour;
+  FixedDepth* const state = tile.state;
+  const size_t stride = tile.stride;
+  const int stepX = tile.stepX;
+  const uint8_t* const wanted = tile.wanted;
+  uint8_t* const bytes = plane.bytes;
+  forRow(tile.width, stepX < 0, [&](ptrdiff_t x) HWY_ATTR {
+    // All rows are read before one is written.
+    Depths rows[kRunEdge];
+    for (size_t row = 0; row < kRunEdge; ++row) {
+      rows[row] = hn::Add(hn::LoadU(tag, next[row] + x + stepX),
+                          segmentsFrom<rule>(own[row], neighbour[row], x, stepX));
+    }
+    if (x < firstInside || x + lanes > lastInside) {
+      for (Depths& row : rows)
+        row = insideOnly(row, tile, x);
+    }
+    for (size_t row = 0; row < kRunEdge; ++row) {
+      if (cut) rows[row] = kept(rows[row]);
+      hn::StoreU(rows[row], tag, state + row * stride + x);
+    }
+    if (wanted[x / kRowUnit] != 0) codeRows(rows, x, bytes);
+  });
 }
 
 /// Running sum along a row, upwards in x or downwards.
@@ -56,7 +214,7 @@ HWY_INLINE void addAlongRow(const FixedDepth* segments, int width, FixedDepth* d
     }
     from[kShifts][i] = kUp ? uint32_t(lanes - 1) : 0;
   }
-  const auto shifted = [&](Depths v, int s) {
+  const auto shifted = [&](Depths v, int s) HWY_ATTR {
     return hn::And(hn::TableLookupLanes(v, hn::SetTableIndices(tag, from[s])), hn::Load(tag, inside[s]));
   };
   const auto last = hn::SetTableIndices(tag, from[kShifts]);
@@ -66,111 +224,93 @@ HWY_INLINE void addAlongRow(const FixedDepth* segments, int width, FixedDepth* d
     Depths v = hn::LoadU(tag, segments + x);
     for (int s = 0; s < kShifts && (1 << s) < lanes; ++s)
       v = hn::Add(v, shifted(v, s));
-    v = sum(v, carry);
+    v = kept(hn::Add(v, carry));
     hn::StoreU(v, tag, depths + x);
     carry = hn::TableLookupLanes(v, last);
   }
 }
 
-void updateStripRows(const StripUpdate& u) {
-  const bool upwards = u.samePlane ? u.stepY < 0 : u.stepY >= 0;
-  for (int i = 0; i < u.rows; ++i) {
-    // Between planes the state is renewed in place: the row that a row reads must not have been renewed yet. Within a
-    // plane it must have been.
-    const int y = upwards ? i : u.rows - 1 - i;
-    const int nextY = y + u.stepY;
-    FixedDepth* depths = u.state + size_t(y) * u.stride;
-    const FixedDepth* segments = u.segments + size_t(y) * u.segmentStride;
-    if (u.samePlane && u.stepY == 0) {
-      if (u.stepX < 0) {
-        addAlongRow<true>(segments, u.width, depths);
-      } else {
-        addAlongRow<false>(segments, u.width, depths);
-      }
+/// One row from its neighbour of the same plane, or along itself.
+template <SegmentRule rule>
+HWY_INLINE void renewRow(const Tile& tile, const TilePlane& plane, size_t row) {
+  const Tag tag;
+  FixedDepth* const depths = tile.state + row * tile.stride;
+  forRow(tile.width, false, [&](ptrdiff_t x) HWY_ATTR {
+    Depths sum = segmentsFrom<rule>(plane.own[row], plane.neighbour[row], x, tile.stepX);
+    if (tile.stepY != 0) sum = kept(hn::Add(sum, hn::LoadU(tag, plane.next[row] + x + tile.stepX)));
+    hn::StoreU(insideOnly(sum, tile, x), tag, (tile.stepY != 0 ? depths : tile.segments) + x);
+  });
+  if (tile.stepY != 0) return;
+  if (tile.stepX < 0) {
+    addAlongRow<true>(tile.segments, tile.width, depths);
+  } else {
+    addAlongRow<false>(tile.segments, tile.width, depths);
+  }
+  // A running sum carries on behind the volume.
+  std::fill(depths + tile.voxels, depths + tile.width, 0);
+}
+
+/// One plane in itself.
+template <SegmentRule rule>
+HWY_INLINE void renewWithinPlane(const Tile& tile, const TilePlane& plane) {
+  for (size_t i = 0; i < kRunEdge; ++i)
+    renewRow<rule>(tile, plane, tile.stepY > 0 ? kRunEdge - 1 - i : i);
+  const Tag tag;
+  forRow(tile.width, false, [&](ptrdiff_t x) HWY_ATTR {
+    if (tile.wanted[x / kRowUnit] == 0) return;
+    Depths rows[kRunEdge];
+    for (size_t row = 0; row < kRunEdge; ++row)
+      rows[row] = hn::LoadU(tag, tile.state + row * tile.stride + x);
+    codeRows(rows, x, plane.bytes);
+  });
+}
+
+template <SegmentRule rule>
+void sweepTileBy(const Tile& tile) {
+  for (int i = 0; i < tile.planeCount; ++i) {
+    const TilePlane& plane = tile.planes[size_t(i)];
+    if (tile.samePlane) {
+      renewWithinPlane<rule>(tile, plane);
+    } else if (i + 1 < tile.planeCount) {
+      renewPlane<rule, false>(tile, plane);
     } else {
-      const FixedDepth* next = nextY >= 0 && nextY < u.rows ? u.state + size_t(nextY) * u.stride : u.upstream;
-      if (next == nullptr) {
-        std::fill_n(depths, u.width, 0);
-        continue;
-      }
-      addRow(next + u.stepX, segments, u.width, u.stepX < 0, depths);
+      renewPlane<rule, true>(tile, plane);
     }
-    std::fill(depths + u.voxels, depths + u.width, 0);
-  }
-}
-
-/// attenuationCode of four or more depths up to kLargestKeptDepth. Its powers differ in the last place, with and
-/// without fused multiply-add; its codes do not, which a test shows for all of them.
-HWY_INLINE Depths codesOf(Depths depths) {
-  const Tag tag;
-  const hn::RebindToSigned<Tag> integers;
-  const hn::RebindToFloat<Tag> floats;
-  const auto f = hn::ConvertTo(floats, hn::BitCast(integers, hn::And(depths, hn::Set(tag, 0x00ffff00))));
-  const auto coefficient = [&](int i) {
-    constexpr float kScale[5] = {1.0f, 0x1p-8f, 0x1p-16f, 0x1p-24f, 0x1p-32f};  // f is in units of 2^-24
-    return hn::Set(floats, kExp2Coefficients[i] * kScale[i]);
-  };
-  auto power = hn::MulAdd(f, coefficient(4), coefficient(3));
-  power = hn::MulAdd(f, power, coefficient(2));
-  power = hn::MulAdd(f, power, coefficient(1));
-  power = hn::MulAdd(f, power, coefficient(0));
-  const auto exponent = hn::ShiftRight<1>(hn::And(depths, hn::Set(tag, 0x0f000000)));
-  const auto code = hn::BitCast(floats, hn::Sub(hn::BitCast(tag, power), exponent));
-  return hn::BitCast(tag, hn::NearestInt(code));
-}
-
-void codeStripRows(const FixedDepth* state, size_t stride, int rows, int width, const StripPart* parts,
-                   size_t partCount, uint32_t* words) {
-  const Tag tag;
-  const auto lanes = int(hn::Lanes(tag));
-  for (int y = 0; y < rows; y += 4) {
-    const FixedDepth* row = state + size_t(y) * stride;
-    uint32_t* out = words + size_t(y / 4) * size_t(width);
-    for (size_t part = 0; part < partCount; ++part) {
-      for (int x = parts[part].first; x < parts[part].last; x += lanes) {
-        const Depths c0 = codesOf(hn::LoadU(tag, row + x));
-        const Depths c1 = codesOf(hn::LoadU(tag, row + stride + x));
-        const Depths c2 = codesOf(hn::LoadU(tag, row + 2 * stride + x));
-        const Depths c3 = codesOf(hn::LoadU(tag, row + 3 * stride + x));
-        const Depths lower = hn::Or(c0, hn::ShiftLeft<8>(c1));
-        const Depths upper = hn::Or(c2, hn::ShiftLeft<8>(c3));
-        hn::StoreU(hn::Or(lower, hn::ShiftLeft<16>(upper)), tag, out + x);
-      }
+    if (plane.leaving != nullptr) {
+      std::memcpy(plane.leaving, tile.state + size_t(tile.leavingRow) * tile.stride,
+                  size_t(tile.width) * sizeof(FixedDepth));
     }
   }
 }
 
-#if HWY_TARGET == HWY_AVX3_DL
-
-HWY_INLINE void storeRun(const uint32_t* words, size_t planeWords, const RunOrder& order, uint8_t* out) {
-  __m512i run = _mm512_castsi128_si512(_mm_loadu_si128(reinterpret_cast<const __m128i*>(words)));
-  run = _mm512_inserti32x4(run, _mm_loadu_si128(reinterpret_cast<const __m128i*>(words + planeWords)), 1);
-  run = _mm512_inserti32x4(run, _mm_loadu_si128(reinterpret_cast<const __m128i*>(words + 2 * planeWords)), 2);
-  run = _mm512_inserti32x4(run, _mm_loadu_si128(reinterpret_cast<const __m128i*>(words + 3 * planeWords)), 3);
-  const __m512i source = _mm512_load_si512(order.source.data());
-  _mm512_stream_si512(reinterpret_cast<__m512i*>(out), _mm512_permutexvar_epi8(source, run));
+void sweepTileRows(const Tile& tile) {
+  switch (tile.rule) {
+    case SegmentRule::neighbour: return sweepTileBy<SegmentRule::neighbour>(tile);
+    case SegmentRule::integral: return sweepTileBy<SegmentRule::integral>(tile);
+    case SegmentRule::splitIntegral: return sweepTileBy<SegmentRule::splitIntegral>(tile);
+  }
 }
 
-#elif HWY_TARGET == HWY_SCALAR
+#if HWY_TARGET == HWY_SCALAR
 
-HWY_INLINE void storeRun(const uint32_t* words, size_t planeWords, const RunOrder& order, uint8_t* out) {
+HWY_INLINE void storeRun(const uint8_t* bytes, size_t planeBytes, const RunOrder& order, uint8_t* out) {
   for (size_t step = 0; step < kRunVoxels; ++step) {
     const size_t place = order.source[step];
-    out[step] = uint8_t(words[place / 16 * planeWords + place / 4 % 4] >> (8 * (place % 4)));
+    out[step] = bytes[place / 16 * planeBytes + place % 16];
   }
 }
 
 #else
 
-HWY_INLINE void storeRun(const uint32_t* words, size_t planeWords, const RunOrder& order, uint8_t* out) {
+HWY_INLINE void storeRun(const uint8_t* voxels, size_t planeBytes, const RunOrder& order, uint8_t* out) {
   const hn::FixedTag<uint8_t, 16> bytes;
   const hn::FixedTag<uint32_t, 4> four;
   const hn::FixedTag<uint64_t, 2> two;
-  // A plane's 4 x 4 voxels as four groups of 2 x 2, group x / 2 * 2 + y / 2.
+  // A plane's 4 x 4 voxels as four groups of 2 x 2, group y / 2 * 2 + x / 2.
   alignas(16) static constexpr uint8_t kGroups[16] = {0, 1, 4, 5, 2, 3, 6, 7, 8, 9, 12, 13, 10, 11, 14, 15};
   const auto groups = hn::Load(bytes, kGroups);
-  const auto plane = [&](size_t z) {
-    return hn::BitCast(four, hn::TableLookupBytes(hn::BitCast(bytes, hn::LoadU(four, words + z * planeWords)), groups));
+  const auto plane = [&](size_t z) HWY_ATTR {
+    return hn::BitCast(four, hn::TableLookupBytes(hn::LoadU(bytes, voxels + z * planeBytes), groups));
   };
   HWY_ALIGN uint64_t octants[8];
   for (size_t z = 0; z < 2; ++z) {
@@ -187,13 +327,41 @@ HWY_INLINE void storeRun(const uint32_t* words, size_t planeWords, const RunOrde
 
 #endif
 
-void storeBrickRuns(const uint32_t* words, size_t planeWords, int width, const BrickRun* runs, int runsPerEdge,
-                    uint8_t* plane) {
-  for (int y = 0; y < runsPerEdge; ++y) {
-    for (int x = 0; x < runsPerEdge; ++x) {
-      const BrickRun& run = runs[y * runsPerEdge + x];
-      storeRun(words + size_t(y) * size_t(width) + size_t(x) * kRunEdge, planeWords, *run.order, plane + run.firstStep);
-    }
+#if HWY_TARGET == HWY_AVX3_DL
+
+/// Four runs beside each other along x.
+HWY_INLINE void storeFourRuns(const uint8_t* bytes, size_t planeBytes, const BrickRun* runs, uint8_t* plane) {
+  const auto load = [&](size_t z) { return _mm512_loadu_si512(bytes + z * planeBytes); };
+  // Quarter x of register z becomes quarter z of register x.
+  const __m512i z0 = load(0), z1 = load(1), z2 = load(2), z3 = load(3);
+  const __m512i lower01 = _mm512_shuffle_i64x2(z0, z1, 0x44), upper01 = _mm512_shuffle_i64x2(z0, z1, 0xee);
+  const __m512i lower23 = _mm512_shuffle_i64x2(z2, z3, 0x44), upper23 = _mm512_shuffle_i64x2(z2, z3, 0xee);
+  const __m512i voxels[4] = {
+      _mm512_shuffle_i64x2(lower01, lower23, 0x88), _mm512_shuffle_i64x2(lower01, lower23, 0xdd),
+      _mm512_shuffle_i64x2(upper01, upper23, 0x88), _mm512_shuffle_i64x2(upper01, upper23, 0xdd)};
+  for (size_t x = 0; x < 4; ++x) {
+    const __m512i source = _mm512_load_si512(runs[x].order->source.data());
+    _mm512_stream_si512(reinterpret_cast<__m512i*>(plane + runs[x].firstStep),
+                        _mm512_permutexvar_epi8(source, voxels[x]));
+  }
+}
+
+#endif
+
+void storeBrickRuns(const uint8_t* bytes, size_t planeBytes, const BrickRow* bricks, size_t brickCount, size_t firstRun,
+                    int runsPerEdge, size_t planeOffset) {
+  for (size_t b = 0; b < brickCount; ++b) {
+    const BrickRow& brick = bricks[b];
+    const BrickRun* runs = brick.runs + firstRun;
+    uint8_t* plane = brick.planes + planeOffset;
+    int x = 0;
+    const auto voxels = [&] { return bytes + size_t(kRunEdge) * size_t(brick.x + x * kRunEdge); };
+#if HWY_TARGET == HWY_AVX3_DL
+    for (; x + 4 <= runsPerEdge; x += 4)
+      storeFourRuns(voxels(), planeBytes, runs + x, plane);
+#endif
+    for (; x < runsPerEdge; ++x)
+      storeRun(voxels(), planeBytes, *runs[x].order, plane + runs[x].firstStep);
   }
 }
 
@@ -204,22 +372,17 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace freevoxel {
 
-HWY_EXPORT(updateStripRows);
-HWY_EXPORT(codeStripRows);
+HWY_EXPORT(sweepTileRows);
 HWY_EXPORT(storeBrickRuns);
 
-void updateStrip(const StripUpdate& update) {
-  HWY_DYNAMIC_DISPATCH(updateStripRows)(update);
+void sweepTile(const Tile& tile) {
+  HWY_DYNAMIC_DISPATCH(sweepTileRows)(tile);
 }
 
-void codeStrip(const FixedDepth* state, size_t stride, int rows, int width, std::span<const StripPart> parts,
-               uint32_t* words) {
-  HWY_DYNAMIC_DISPATCH(codeStripRows)(state, stride, rows, width, parts.data(), parts.size(), words);
-}
-
-void storeRuns(const uint32_t* words, size_t planeWords, int width, const BrickRun* runs, int runsPerEdge,
-               uint8_t* plane) {
-  HWY_DYNAMIC_DISPATCH(storeBrickRuns)(words, planeWords, width, runs, runsPerEdge, plane);
+void storeRuns(const uint8_t* bytes, size_t planeBytes, std::span<const BrickRow> bricks, size_t firstRun,
+               int runsPerEdge, size_t planeOffset) {
+  HWY_DYNAMIC_DISPATCH(storeBrickRuns)
+  (bytes, planeBytes, bricks.data(), bricks.size(), firstRun, runsPerEdge, planeOffset);
 }
 
 void finishStores() {

@@ -1,56 +1,67 @@
-// The inner loops of a sweep, for every instruction set: state in, bytes in brick planes out. They work on a strip: the
-// voxels of one row of bricks, all x and one brick edge of y, of one z plane.
+// The inner loops of a sweep, for every instruction set: state in, bytes in brick planes out. They work on a tile: four
+// rows of four planes, as wide as the volume, so that what several directions read of it stays in the nearest caches,
+// and what comes out are whole runs of the curve.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "precompute/fixed_depth.h"
 #include "precompute/run_order.h"
+#include "precompute/segment_depth.h"
 
 namespace freevoxel {
 
-/// Depths are kept up to here. Everything from 9 log2 on has A8 = 0, so bytes are those of saturation at 2^32 - 1; and
-/// no sum of two, nor of 16 segments and one of them, leaves 32 bits.
+/// From plane to plane depths are cut to this at the end of a tile, within a plane in every row. Everything from 9 log2
+/// on has A8 = 0, so bytes are those of saturation at 2^32 - 1; and this and 16 segments do not leave 32 bits.
 inline constexpr FixedDepth kLargestKeptDepth = 0x0fffffff;
 
-/// Rows of depths are this long or a multiple of it, and have as much room before and behind them.
+/// Rows are this long or a multiple of it, and have as much room before and behind them.
 inline constexpr int kRowUnit = 16;
 
-/// One plane of a strip: state of voxel (x, y) becomes state of its neighbour (x + stepX, y + stepY), one step further
-/// out, plus the segment to it.
-struct StripUpdate {
-  FixedDepth* state = nullptr;  ///< row 0 of the strip; of the plane before, or of this one where stepZ is 0
+/// One plane of a tile. Pointers are to voxel 0 of a row of volume and lie in rows whose room before and behind is 0.
+/// What lies outside the volume is a row of zeros; if a neighbour does, so are both ends of the segment to it.
+struct TilePlane {
+  /// Depths of the neighbours' row, less the step along x: for directions that leave the plane, of the plane before.
+  std::array<const FixedDepth*, kRunEdge> next{};
+  std::array<SegmentTerms, kRunEdge> own{}, neighbour{};
+  FixedDepth* leaving = nullptr;  ///< where the tile's outermost row is copied to, or null
+  uint8_t* bytes = nullptr;       ///< A8: byte x % 4 + 4 * row of the 16 at 4 * (x - x % 4)
+};
+
+/// Depths of four rows, renewed from plane to plane along one direction.
+struct Tile {
+  SegmentRule rule = SegmentRule::neighbour;
+  FixedDepth* state = nullptr;  ///< row 0
   size_t stride = 0;            ///< from row to row
-  int rows = 0;                 ///< rows inside the volume
   int width = 0;                ///< voxels of a row, rounded up to kRowUnit
   int voxels = 0;               ///< of a row, inside the volume
   int stepX = 0, stepY = 0;
-  bool samePlane = false;                ///< stepZ is 0
-  const FixedDepth* upstream = nullptr;  ///< the neighbours' row beyond the strip; null: outside the volume
-  const FixedDepth* segments = nullptr;  ///< segments[y * segmentStride + x]; 0 where the neighbour is outside
-  size_t segmentStride = 0;
+  bool samePlane = false;               ///< the direction stays in its plane
+  int leavingRow = 0;                   ///< see TilePlane::leaving
+  const uint8_t* wanted = nullptr;      ///< for each kRowUnit voxels: whether their bytes are needed
+  FixedDepth* segments = nullptr;       ///< room for a row, for directions that stay in their plane
+  std::array<TilePlane, kRunEdge> planes{};
+  int planeCount = 0;
 };
 
-/// Entry -1 and entry `width` of every row must be 0 and stay so; so do those from `voxels` on.
-void updateStrip(const StripUpdate& update);
+/// Renews the state plane by plane and gives the bytes of every plane. Room before and behind the rows, and behind
+/// `voxels`, must be 0 and stays so.
+void sweepTile(const Tile& tile);
 
-/// Voxels first..last-1 of the rows of a strip.
-struct StripPart {
-  int first = 0, last = 0;  ///< multiples of kRowUnit
+/// Where the runs of a brick go.
+struct BrickRow {
+  int x = 0;                       ///< first voxel, a multiple of the brick's edge
+  const BrickRun* runs = nullptr;  ///< of the whole brick
+  uint8_t* planes = nullptr;       ///< edge^3 bytes each along the curve, 64-byte aligned
 };
 
-/// Bytes of one plane: words[(y / 4) * width + x] holds attenuationCode of four successive rows, the lowest y in the
-/// lowest byte. `rows` is a multiple of 4.
-void codeStrip(const FixedDepth* state, size_t stride, int rows, int width, std::span<const StripPart> parts,
-               uint32_t* words);
-
-/// Writes the runs of one brick that share z, permuted, past the caches. `words`: the brick's first word in the first
-/// of four planes, as codeStrip makes them, planeWords apart; `runs`: runsPerEdge^2 of them, x fastest; `plane`: edge^3
-/// bytes along the curve, 64-byte aligned.
-void storeRuns(const uint32_t* words, size_t planeWords, int width, const BrickRun* runs, int runsPerEdge,
-               uint8_t* plane);
+/// Permutes the bytes of a tile, planeBytes apart, and writes them past the caches: of every brick the runs
+/// firstRun .. firstRun + runsPerEdge - 1, in the plane that starts planeOffset bytes behind the first.
+void storeRuns(const uint8_t* bytes, size_t planeBytes, std::span<const BrickRow> bricks, size_t firstRun,
+               int runsPerEdge, size_t planeOffset);
 
 /// Makes what storeRuns wrote visible to other threads that are told of it.
 void finishStores();
