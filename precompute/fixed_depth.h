@@ -26,8 +26,8 @@ constexpr FixedDepth saturatingSum(FixedDepth a, FixedDepth b) {
 
 /// Depths from here on, in units of 2^-12 log2, are one: A8 is 0 from 9 log2 on.
 inline constexpr int32_t kLargestCodedDepth = 0xffff;
-/// 2^7 * 255 * 2^-f = c[0] - f (c[1] - f (c[2] - f c[3])) for a fraction f = 0..1, to 2.9: chosen for the smallest error
-/// in the middles of 4096 intervals, products rounded to whole numbers.
+/// 2^7 * 255 * 2^-f = c[0] - f (c[1] - f (c[2] - f c[3])) for a fraction f = 0..1, to 2.9: chosen for the smallest
+/// error in the middles of 4096 intervals, products rounded to whole numbers.
 inline constexpr int16_t kExp2Coefficients[4] = {32637, 22573, 7551, 1298};
 inline constexpr int kExp2FractionBits = 7;
 

@@ -85,10 +85,11 @@ SlabBricks sortBricks(const Shape& shape, std::span<const BrickPlanes> bricks) {
 }
 
 /// What voxels contribute to segments: of a strip, the rows beside it and the plane before, in the order of the sweep.
+/// Rows of one strip that the next one needs too stay where they are.
 class StripTerms {
  public:
-  StripTerms(const Shape& shape, SegmentRule rule) : zeros_(1, shape.width) {
-    const int rows = (shape.edge + 1) * kRows;
+  StripTerms(const Shape& shape, SegmentRule rule) {
+    const int rows = (shape.edge + 1) * kPlaneRows;
     own_ = Rows(rows, shape.width);
     if (rule == SegmentRule::neighbour) return;
     code_ = Rows(rows, shape.width);
@@ -96,146 +97,157 @@ class StripTerms {
     if (rule == SegmentRule::splitIntegral) low_ = Rows(rows, shape.width);
   }
 
-  /// Fills a plane. `place` counts planes from the one before the slab, which is 0.
-  void fill(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int place, int z, int strip) {
+  /// The strips of a slab come one after another.
+  void begin(int strip) {
+    filledBefore_ = strip_;
+    strip_ = strip;
+  }
+  void endSlab() { strip_ = kNoStrip; }
+
+  /// Fills a plane of the strip. `place` counts planes from the one before the slab, which is 0.
+  void fill(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int place, int z) {
+    if (z < 0 || z >= shape.dims.z) return;
     for (int y = -1; y <= kRunEdge; ++y) {
-      const glm::ivec3 first(0, strip * kRunEdge + y, z);
-      if (first.y < 0 || first.y >= shape.dims.y || z < 0 || z >= shape.dims.z) continue;
-      const uint16_t* row = codes.codes + linearIndex(first - glm::ivec3(0, 0, codes.first), shape.dims);
-      const int at = index(place, y);
-      segments.terms({row, size_t(shape.dims.x)}, {own_.row(at), floats(code_, at), floats(high_, at), floats(low_, at)});
+      const glm::ivec3 first(0, strip_ * kRunEdge + y, z - codes.first);
+      const int yBefore = (strip_ - filledBefore_) * kRunEdge + y;
+      const bool filled = filledBefore_ != kNoStrip && yBefore >= -1 && yBefore <= kRunEdge;
+      if (filled || first.y < 0 || first.y >= shape.dims.y) continue;
+      const int row = place * kPlaneRows + rowInPlane(y);
+      segments.terms({codes.codes + linearIndex(first, shape.dims), size_t(shape.dims.x)},
+                     {own_.row(row), floats(code_, row), floats(high_, row), floats(low_, row)});
     }
   }
 
-  /// Row y of the strip, -1..kRunEdge.
-  SegmentTerms row(int place, int y) {
-    const int at = index(place, y);
-    return {own_.row(at), floats(code_, at), floats(high_, at), floats(low_, at)};
-  }
-  /// A row outside the volume.
-  SegmentTerms nothing() {
-    const auto* zeros = reinterpret_cast<const float*>(zeros_.row(0));
-    return {zeros_.row(0), zeros, zeros, zeros};
-  }
-  const FixedDepth* noDepths() { return zeros_.row(0); }
+  SegmentTerms all() { return {own_.row(0), floats(code_, 0), floats(high_, 0), floats(low_, 0)}; }
+  /// Entry in all() at which a plane starts.
+  uint32_t plane(int place) const { return entry(place * kPlaneRows); }
+  /// From there to row y of the strip, -1..kRunEdge.
+  uint32_t row(int y) const { return entry(rowInPlane(y)); }
+  /// From there to a row outside the volume.
+  uint32_t nothing() const { return entry(kRows); }
 
  private:
   static constexpr int kRows = kRunEdge + 2;
-  static int index(int place, int y) { return place * kRows + 1 + y; }
+  static constexpr int kPlaneRows = kRows + 1;  ///< the last one is nothing
+  static constexpr int kNoStrip = -1;
+  int rowInPlane(int y) const { return (strip_ * kRunEdge + y + 1) % kRows; }
+  uint32_t entry(int row) const { return uint32_t(size_t(row) * own_.stride()); }
   static float* floats(Rows& rows, int row) {
     return rows.stride() == 0 ? nullptr : reinterpret_cast<float*>(rows.row(row));
   }
 
-  Rows own_, code_, high_, low_, zeros_;
+  Rows own_, code_, high_, low_;
+  int strip_ = kNoStrip, filledBefore_ = kNoStrip;
 };
 
 /// What a thread needs for the strip at hand.
 struct Scratch {
   Scratch(const Shape& shape, SegmentRule rule)
-      : terms(shape, rule), segments(1, shape.width), bytes(kRunEdge, shape.width) {}
+      : terms(shape, rule), noDepths(1, shape.width), segments(1, shape.width), bytes(kRunEdge, shape.width) {}
   StripTerms terms;
+  Rows noDepths;  ///< zeros
   Rows segments;
   Rows bytes;  ///< four planes of a strip: see TilePlane::bytes
 };
 
-/// Where a strip of a slab is, and how far its sweep has come.
+/// Four planes of a strip, in the order of the sweep.
 struct TilePlace {
-  int slab, strip;
-  int runZ;       ///< of the four planes at hand
-  int done;       ///< planes of the slab that are behind, all inside the volume
-  int planes;     ///< of the four that are inside the volume
-  int firstZ;     ///< of these, the first in the order of the sweep
+  int strip;
+  int runZ;    ///< of the planes, in the slab
+  int planes;  ///< inside the volume
+  int firstZ;  ///< of these
+  int done;    ///< planes of the slab that are behind, all inside the volume
 };
 
 /// Depths along one direction, kept from plane to plane and from strip to strip.
 class DirectionSweep {
  public:
-  DirectionSweep(int direction, const Shape& shape)
+  DirectionSweep(int direction, const Shape& shape, SegmentRule rule)
       : direction_(direction),
         step_(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction)),
         state_(step_.z != 0 ? shape.strips() * kRunEdge : kRunEdge, shape.width) {
-    if (step_.y == 0) return;
-    for (Rows& rows : edges_)
-      rows = Rows(shape.edge + 1, shape.width);
+    if (step_.y != 0) {
+      for (Rows& rows : edges_)
+        rows = Rows(shape.edge + 1, shape.width);
+    }
+    tile_.rule = rule;
+    tile_.stride = state_.stride();
+    tile_.width = shape.width;
+    tile_.voxels = shape.dims.x;
+    tile_.stepX = step_.x;
+    tile_.stepY = step_.y;
+    tile_.samePlane = step_.z == 0;
+    tile_.leavingRow = step_.y > 0 ? 0 : kRunEdge - 1;
   }
 
   glm::ivec3 step() const { return step_; }
 
   /// Before the first tile of a strip. Strips come from the outside inwards: ascending where the direction points down
   /// in y, descending where it points up.
-  void beginStrip(const Shape& shape, int strip) {
-    if (step_.y == 0 || step_.z == 0) return;
-    std::memcpy(edges_[1].row(0), stripState(strip) + size_t(leavingRow()) * state_.stride(),
-                size_t(shape.width) * sizeof(FixedDepth));
+  void beginStrip(const Shape& shape, int strip, const SlabBricks& bricks, Scratch& scratch) {
+    tile_.terms = scratch.terms.all();
+    tile_.state = state_.row(step_.z != 0 ? strip * kRunEdge : 0);
+    tile_.wanted = bricks.wanted[size_t(strip / shape.runsPerEdge())].data();
+    tile_.segments = scratch.segments.row(0);
+    tile_.beyondRow = -1;
+    for (int y = 0; y < kRunEdge; ++y) {
+      const auto row = size_t(y);
+      const int volumeY = strip * kRunEdge + y, nextY = volumeY + step_.y;
+      if (volumeY >= shape.dims.y || nextY < 0 || nextY >= shape.dims.y) {
+        tile_.next[row] = scratch.noDepths.row(0);
+        tile_.own[row] = tile_.neighbour[row] = scratch.terms.nothing();
+        continue;
+      }
+      if (y + step_.y < 0 || y + step_.y >= kRunEdge) {
+        tile_.beyondRow = y;
+      } else {
+        tile_.next[row] = tile_.state + size_t(y + step_.y) * tile_.stride;
+      }
+      tile_.own[row] = scratch.terms.row(y);
+      tile_.neighbour[row] = scratch.terms.row(y + step_.y);
+    }
+    if (step_.y != 0 && step_.z != 0) {
+      std::memcpy(edges_[1].row(0), tile_.state + size_t(tile_.leavingRow) * tile_.stride,
+                  size_t(shape.width) * sizeof(FixedDepth));
+    }
   }
 
   /// After its last tile.
   void endStrip() { std::swap(edges_[0], edges_[1]); }
 
-  /// Four planes of a strip: their bytes go to the bricks.
-  void sweep(const Shape& shape, SegmentRule rule, const TilePlace& place, const SlabBricks& bricks, Scratch& scratch) {
-    const auto brickRow = size_t(place.strip / shape.runsPerEdge());
+  /// Four planes of the strip: their bytes go to the bricks.
+  void sweep(const Shape& shape, const TilePlace& place, const SlabBricks& bricks, Scratch& scratch) {
     auto* const bytes = reinterpret_cast<uint8_t*>(scratch.bytes.row(0));
     const size_t planeBytes = scratch.bytes.stride() * sizeof(FixedDepth);
-    const int rows = shape.stripRows(place.strip);
-    if (place.planes < kRunEdge || rows == 0) {
+    const bool nothing = place.planes == 0 || place.strip * kRunEdge >= shape.dims.y;
+    if (nothing || place.planes < kRunEdge) {
       std::memset(bytes, kAttenuationOutside, (kRunEdge - 1) * planeBytes + size_t(shape.width) * kRunEdge);
     }
-    if (place.planes > 0 && rows > 0) {
-      Tile tile;
-      tile.rule = rule;
-      tile.state = stripState(place.strip);
-      tile.stride = state_.stride();
-      tile.width = shape.width;
-      tile.voxels = shape.dims.x;
-      tile.stepX = step_.x;
-      tile.stepY = step_.y;
-      tile.samePlane = step_.z == 0;
-      tile.leavingRow = leavingRow();
-      tile.wanted = bricks.wanted[brickRow].data();
-      tile.segments = scratch.segments.row(0);
-      tile.planeCount = place.planes;
-      for (int i = 0; i < place.planes; ++i)
-        tile.planes[size_t(i)] = plane(shape, place, i, scratch, bytes, planeBytes);
-      sweepTile(tile);
+    if (!nothing) {
+      const int order = sweepPass(direction_) == 0 ? 1 : -1;
+      for (int i = 0; i < place.planes; ++i) {
+        const int z = place.firstZ + order * i, done = place.done + i;
+        const int neighbourPlace = step_.z != 0 ? done : done + 1;
+        TilePlane& plane = tile_.planes[size_t(i)];
+        plane.own = scratch.terms.plane(done + 1);
+        plane.neighbour = scratch.terms.plane(neighbourPlace);
+        plane.neighbourOutside = z + step_.z < 0 || z + step_.z >= shape.dims.z;
+        plane.bytes = bytes + size_t(z % kRunEdge) * planeBytes;
+        if (step_.y == 0) continue;
+        plane.beyond = edges_[0].row(neighbourPlace);
+        plane.leaving = edges_[1].row(done + 1);
+      }
+      tile_.planeCount = place.planes;
+      sweepTile(tile_);
     }
-    const auto runs = size_t(shape.runsPerEdge());
+    const int runs = shape.runsPerEdge();
     const size_t brickVoxels = size_t(shape.edge) * size_t(shape.edge) * size_t(shape.edge);
-    storeRuns(bytes, planeBytes, bricks.rows[brickRow],
-              (size_t(place.runZ) * runs + size_t(place.strip) % runs) * runs, int(runs),
+    storeRuns(bytes, planeBytes, bricks.rows[size_t(place.strip / runs)],
+              size_t((place.runZ * runs + place.strip % runs) * runs), runs,
               size_t(direction_ % kDirectionsPerSection) * brickVoxels);
   }
 
  private:
-  FixedDepth* stripState(int strip) { return state_.row(step_.z != 0 ? strip * kRunEdge : 0); }
-  int leavingRow() const { return step_.y > 0 ? 0 : kRunEdge - 1; }
-
-  TilePlane plane(const Shape& shape, const TilePlace& place, int i, Scratch& scratch, uint8_t* bytes,
-                  size_t planeBytes) {
-    const int z = place.firstZ - i * zOrder(), done = place.done + i;
-    const int neighbourPlace = step_.z != 0 ? done : done + 1;
-    const bool planeOutside = z + step_.z < 0 || z + step_.z >= shape.dims.z;
-    FixedDepth* const state = stripState(place.strip);
-    TilePlane plane;
-    for (int y = 0; y < kRunEdge; ++y) {
-      const auto row = size_t(y);
-      const int volumeY = place.strip * kRunEdge + y, nextY = volumeY + step_.y;
-      if (planeOutside || volumeY >= shape.dims.y || nextY < 0 || nextY >= shape.dims.y) {
-        plane.next[row] = scratch.terms.noDepths();
-        plane.own[row] = plane.neighbour[row] = scratch.terms.nothing();
-        continue;
-      }
-      const bool beyond = y + step_.y < 0 || y + step_.y >= kRunEdge;
-      plane.next[row] = beyond ? edges_[0].row(neighbourPlace) : state + ptrdiff_t(y + step_.y) * ptrdiff_t(state_.stride());
-      plane.own[row] = scratch.terms.row(done + 1, y);
-      plane.neighbour[row] = scratch.terms.row(neighbourPlace, y + step_.y);
-    }
-    if (step_.y != 0) plane.leaving = edges_[1].row(done + 1);
-    plane.bytes = bytes + size_t(z % shape.edge % kRunEdge) * planeBytes;
-    return plane;
-  }
-  int zOrder() const { return sweepPass(direction_) == 0 ? -1 : 1; }
-
   int direction_;
   glm::ivec3 step_;
   /// Of the plane before, or of a strip of this one if the direction stays in its plane.
@@ -243,6 +255,7 @@ class DirectionSweep {
   /// The rows through which rays come in from the strip before, and those through which they leave this one: before the
   /// first plane of the slab, and after each.
   Rows edges_[2];
+  Tile tile_;  ///< at hand
 };
 
 /// Directions that one thread sweeps together: all strips of a slab, in one order.
@@ -254,32 +267,34 @@ struct SweepGroup {
   void sweepSlab(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int slab,
                  const SlabBricks& bricks, Scratch& scratch) {
     const int planes = shape.slabPlanes(slab), first = slab * shape.edge;
-    const int beforeZ = pass == 0 ? first - 1 : first + planes;
+    const int order = pass == 0 ? 1 : -1;
     for (int i = 0; i < shape.strips(); ++i) {
       const int strip = ascending ? i : shape.strips() - 1 - i;
-      scratch.terms.fill(shape, segments, codes, 0, beforeZ, strip);
+      scratch.terms.begin(strip);
+      scratch.terms.fill(shape, segments, codes, 0, pass == 0 ? first - 1 : first + planes);
       for (DirectionSweep& sweep : sweeps)
-        sweep.beginStrip(shape, strip);
-      TilePlace place{slab, strip, 0, 0, 0, 0};
+        sweep.beginStrip(shape, strip, bricks, scratch);
+      int done = 0;
       for (int run = 0; run < shape.runsPerEdge(); ++run) {
-        place.runZ = pass == 0 ? run : shape.runsPerEdge() - 1 - run;
+        TilePlace place{strip, pass == 0 ? run : shape.runsPerEdge() - 1 - run, 0, 0, done};
         place.planes = std::clamp(planes - place.runZ * kRunEdge, 0, kRunEdge);
         place.firstZ = first + place.runZ * kRunEdge + (pass == 0 ? 0 : place.planes - 1);
         for (int p = 0; p < place.planes; ++p)
-          scratch.terms.fill(shape, segments, codes, place.done + p + 1, place.firstZ + (pass == 0 ? p : -p), strip);
+          scratch.terms.fill(shape, segments, codes, done + p + 1, place.firstZ + order * p);
         for (DirectionSweep& sweep : sweeps)
-          sweep.sweep(shape, segments.rule(), place, bricks, scratch);
-        place.done += place.planes;
+          sweep.sweep(shape, place, bricks, scratch);
+        done += place.planes;
       }
       for (DirectionSweep& sweep : sweeps)
         sweep.endStrip();
     }
+    scratch.terms.endSlab();
     finishStores();
   }
 };
 
 /// As few groups as keep the threads busy: each computes anew what depends on voxels only.
-std::vector<SweepGroup> makeGroups(const Shape& shape, unsigned passes, int threads) {
+std::vector<SweepGroup> makeGroups(const Shape& shape, SegmentRule rule, unsigned passes, int threads) {
   const int passCount = std::popcount(passes);
   const bool merge = threads <= passCount;
   const bool split = threads > 3 * passCount;
@@ -296,7 +311,7 @@ std::vector<SweepGroup> makeGroups(const Shape& shape, unsigned passes, int thre
     };
     auto group = std::find_if(groups.begin(), groups.end(), fits);
     if (group == groups.end()) group = groups.insert(groups.end(), {pass, order <= 0, {}});
-    group->sweeps.emplace_back(direction, shape);
+    group->sweeps.emplace_back(direction, shape, rule);
   }
   std::stable_sort(groups.begin(), groups.end(),
                    [](const SweepGroup& a, const SweepGroup& b) { return a.sweeps.size() > b.sweeps.size(); });
@@ -319,7 +334,7 @@ void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const Segmen
   check(validDims(dims) && validBrickEdge(edge), "dims and brick edge are valid");
   const Shape shape(dims, edge);
   const int threads = omp_get_max_threads();
-  std::vector<SweepGroup> groups = makeGroups(shape, passes, threads);
+  std::vector<SweepGroup> groups = makeGroups(shape, segments.rule(), passes, threads);
   std::vector<Scratch> scratches;
   for (int i = 0; i < threads; ++i)
     scratches.emplace_back(shape, segments.rule());
@@ -362,7 +377,7 @@ uint64_t sweepBytes(glm::ivec3 dims, int edge, int passCount, int threads) {
   const uint64_t rowBytes = (uint64_t(shape.width) + 2 * kRowUnit) * sizeof(FixedDepth);
   const auto e = uint64_t(edge);
   const uint64_t directionRows = 9 * uint64_t(shape.strips()) * kRunEdge + 4 * kRunEdge + 9 * 2 * (e + 1);
-  const uint64_t threadRows = 4 * (e + 1) * (kRunEdge + 2) + kRunEdge + 2;
+  const uint64_t threadRows = 4 * (e + 1) * (kRunEdge + 3) + kRunEdge + 2;
   return rowBytes * (uint64_t(passCount) * directionRows + uint64_t(threads) * threadRows);
 }
 

@@ -65,8 +65,8 @@ class AttenuationSink {
 void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments, AttenuationSink& sink,
                       unsigned passes = 3);
 
-/// Memory that sweepAttenuation takes beside codes and brick planes: 36 bytes per voxel of an xy plane and pass, and per
-/// voxel along x about 70 edge bytes for each pass and 100 edge for each thread.
+/// Memory that sweepAttenuation takes beside codes and brick planes: 36 bytes per voxel of an xy plane and pass, and
+/// per voxel along x about 70 edge bytes for each pass and 100 edge for each thread.
 uint64_t sweepBytes(glm::ivec3 dims, int edge, int passCount, int threads);
 
 }  // namespace freevoxel

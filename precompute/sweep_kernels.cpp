@@ -45,35 +45,38 @@ HWY_INLINE Depths meanOrOwn(Floats integral, Floats codes, Depths own) {
 
 #endif
 
-/// Segments from voxels x, x + 1, .. to their neighbours, where these lie in the volume.
+/// Segments from voxels of entry `own` on to those of entry `neighbour` on, where both lie in the volume.
 template <SegmentRule rule>
-HWY_INLINE Depths segmentsFrom(const SegmentTerms& own, const SegmentTerms& neighbour, ptrdiff_t x, int stepX) {
+HWY_INLINE Depths segmentsBetween(const SegmentTerms& terms, ptrdiff_t own, ptrdiff_t neighbour) {
   const Tag tag;
   const hn::RebindToFloat<Tag> floats;
-  const ptrdiff_t next = x + stepX;
   if constexpr (rule == SegmentRule::neighbour) {
-    return hn::LoadU(tag, neighbour.own + next);
+    return hn::LoadU(tag, terms.own + neighbour);
   } else {
-    const auto difference = [&](const float* from, const float* to) {
-      return hn::Sub(hn::LoadU(floats, to + next), hn::LoadU(floats, from + x));
+    const auto difference = [&](const float* values) HWY_ATTR {
+      return hn::Sub(hn::LoadU(floats, values + neighbour), hn::LoadU(floats, values + own));
     };
-    auto integral = difference(own.high, neighbour.high);
-    if constexpr (rule == SegmentRule::splitIntegral) {
-      integral = hn::Add(integral, difference(own.low, neighbour.low));
-    }
-    return meanOrOwn(integral, difference(own.code, neighbour.code), hn::LoadU(tag, own.own + x));
+    auto integral = difference(terms.high);
+    if constexpr (rule == SegmentRule::splitIntegral) integral = hn::Add(integral, difference(terms.low));
+    return meanOrOwn(integral, difference(terms.code), hn::LoadU(tag, terms.own + own));
   }
 }
 
-/// Zero for voxels that lie outside the volume, or whose neighbours do.
-HWY_INLINE Depths insideOnly(Depths depths, const Tile& tile, ptrdiff_t x) {
-  const Tag tag;
-  const hn::RebindToSigned<Tag> integers;
-  const auto at = hn::Iota(integers, int32_t(x));
-  const int32_t first = tile.stepX < 0 ? 1 : 0, last = tile.voxels - 1 - (tile.stepX > 0 ? 1 : 0);
-  const auto outside = hn::Or(hn::Lt(at, hn::Set(integers, first)), hn::Gt(at, hn::Set(integers, last)));
-  return hn::IfThenElse(hn::RebindMask(tag, outside), hn::Zero(tag), depths);
-}
+/// Which voxels of a row lie in the volume with their neighbours.
+struct Inside {
+  explicit Inside(const Tile& tile) : first(tile.stepX < 0 ? 1 : 0), last(tile.voxels - (tile.stepX > 0 ? 2 : 1)) {}
+  bool all(ptrdiff_t x) const { return x >= first && x + ptrdiff_t(hn::Lanes(Tag())) - 1 <= last; }
+  /// Zero for the others.
+  HWY_INLINE Depths only(Depths depths, ptrdiff_t x) const {
+    HWY_ALIGN static constexpr int32_t kLanes[kRowUnit] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    const hn::RebindToSigned<Tag> integers;
+    const auto at = hn::Add(hn::Load(integers, kLanes), hn::Set(integers, int32_t(x)));
+    const auto outside =
+        hn::Or(hn::Lt(at, hn::Set(integers, int32_t(first))), hn::Gt(at, hn::Set(integers, int32_t(last))));
+    return hn::IfThenElse(hn::RebindMask(Tag(), outside), hn::Zero(Tag()), depths);
+  }
+  ptrdiff_t first, last;
+};
 
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
 
@@ -117,8 +120,7 @@ HWY_INLINE Words codesOf(Words coded) {
   // 2^(8 - whole): the product is the power shifted and rounded.
   alignas(64) static constexpr int16_t kScales[32] = {256, 128, 64, 32, 16, 8, 4, 2, 1};
   static_assert(kExp2FractionBits == 7);
-  const hn::Vec<hn::RebindToSigned<WordTag>> scales{
-      _mm512_permutexvar_epi16(whole.raw, _mm512_load_si512(kScales))};
+  const hn::Vec<hn::RebindToSigned<WordTag>> scales{_mm512_permutexvar_epi16(whole.raw, _mm512_load_si512(kScales))};
   return hn::BitCast(words, hn::MulFixedPoint15(power, scales));
 #else
   const auto half = hn::Set(words, 1u << (kExp2FractionBits - 1));
@@ -168,31 +170,34 @@ HWY_INLINE void forRow(int width, bool descending, F&& f) {
 template <SegmentRule rule, bool cut>
 HWY_INLINE void renewPlane(const Tile& tile, const TilePlane& plane) {
   const Tag tag;
-  const auto lanes = ptrdiff_t(hn::Lanes(tag));
-  const ptrdiff_t firstInside = tile.stepX < 0 ? 1 : 0, lastInside = tile.voxels - (tile.stepX > 0 ? 1 : 0);
-  const std::array<const FixedDepth*, kRunEdge> next = plane.next;
-  const std::array<SegmentTerms, kRunEdge> own = plane.own, neighbour = plane.neighbour;
+  const Inside inside(tile);
+  const SegmentTerms terms = tile.terms;
   FixedDepth* const state = tile.state;
   const size_t stride = tile.stride;
-  const int stepX = tile.stepX;
   const uint8_t* const wanted = tile.wanted;
-  uint8_t* const bytes = plane.bytes;
-  forRow(tile.width, stepX < 0, [&](ptrdiff_t x) HWY_ATTR {
+  const FixedDepth* next[kRunEdge];
+  ptrdiff_t own[kRunEdge], neighbour[kRunEdge];
+  for (size_t row = 0; row < kRunEdge; ++row) {
+    next[row] = (int(row) == tile.beyondRow ? plane.beyond : tile.next[row]) + tile.stepX;
+    own[row] = ptrdiff_t(plane.own) + tile.own[row];
+    neighbour[row] = ptrdiff_t(plane.neighbour) + tile.neighbour[row] + tile.stepX;
+  }
+  forRow(tile.width, tile.stepX < 0, [&](ptrdiff_t x) HWY_ATTR {
     // All rows are read before one is written.
     Depths rows[kRunEdge];
     for (size_t row = 0; row < kRunEdge; ++row) {
-      rows[row] = hn::Add(hn::LoadU(tag, next[row] + x + stepX),
-                          segmentsFrom<rule>(own[row], neighbour[row], x, stepX));
+      const Depths segments = segmentsBetween<rule>(terms, own[row] + x, neighbour[row] + x);
+      rows[row] = hn::Add(hn::LoadU(tag, next[row] + x), segments);
     }
-    if (x < firstInside || x + lanes > lastInside) {
+    if (!inside.all(x)) {
       for (Depths& row : rows)
-        row = insideOnly(row, tile, x);
+        row = inside.only(row, x);
     }
     for (size_t row = 0; row < kRunEdge; ++row) {
       if (cut) rows[row] = kept(rows[row]);
       hn::StoreU(rows[row], tag, state + row * stride + x);
     }
-    if (wanted[x / kRowUnit] != 0) codeRows(rows, x, bytes);
+    if (wanted[x / kRowUnit] != 0) codeRows(rows, x, plane.bytes);
   });
 }
 
@@ -234,13 +239,24 @@ HWY_INLINE void addAlongRow(const FixedDepth* segments, int width, FixedDepth* d
 template <SegmentRule rule>
 HWY_INLINE void renewRow(const Tile& tile, const TilePlane& plane, size_t row) {
   const Tag tag;
+  const Inside inside(tile);
   FixedDepth* const depths = tile.state + row * tile.stride;
+  const auto segmentsAt = [&](ptrdiff_t x) HWY_ATTR {
+    return segmentsBetween<rule>(tile.terms, ptrdiff_t(plane.own) + tile.own[row] + x,
+                                 ptrdiff_t(plane.neighbour) + tile.neighbour[row] + tile.stepX + x);
+  };
+  if (tile.stepY != 0) {
+    const FixedDepth* const next = (int(row) == tile.beyondRow ? plane.beyond : tile.next[row]) + tile.stepX;
+    forRow(tile.width, false, [&](ptrdiff_t x) HWY_ATTR {
+      const Depths sum = kept(hn::Add(segmentsAt(x), hn::LoadU(tag, next + x)));
+      hn::StoreU(inside.all(x) ? sum : inside.only(sum, x), tag, depths + x);
+    });
+    return;
+  }
   forRow(tile.width, false, [&](ptrdiff_t x) HWY_ATTR {
-    Depths sum = segmentsFrom<rule>(plane.own[row], plane.neighbour[row], x, tile.stepX);
-    if (tile.stepY != 0) sum = kept(hn::Add(sum, hn::LoadU(tag, plane.next[row] + x + tile.stepX)));
-    hn::StoreU(insideOnly(sum, tile, x), tag, (tile.stepY != 0 ? depths : tile.segments) + x);
+    const Depths segments = segmentsAt(x);
+    hn::StoreU(inside.all(x) ? segments : inside.only(segments, x), tag, tile.segments + x);
   });
-  if (tile.stepY != 0) return;
   if (tile.stepX < 0) {
     addAlongRow<true>(tile.segments, tile.width, depths);
   } else {
@@ -265,11 +281,20 @@ HWY_INLINE void renewWithinPlane(const Tile& tile, const TilePlane& plane) {
   });
 }
 
+/// A plane from which one step leaves the volume.
+void clearPlane(const Tile& tile, const TilePlane& plane) {
+  for (size_t row = 0; row < kRunEdge; ++row)
+    std::fill_n(tile.state + row * tile.stride, tile.width, FixedDepth(0));
+  std::memset(plane.bytes, attenuationCode(0), size_t(kRunEdge) * size_t(tile.width));
+}
+
 template <SegmentRule rule>
 void sweepTileBy(const Tile& tile) {
   for (int i = 0; i < tile.planeCount; ++i) {
     const TilePlane& plane = tile.planes[size_t(i)];
-    if (tile.samePlane) {
+    if (plane.neighbourOutside) {
+      clearPlane(tile, plane);
+    } else if (tile.samePlane) {
       renewWithinPlane<rule>(tile, plane);
     } else if (i + 1 < tile.planeCount) {
       renewPlane<rule, false>(tile, plane);
@@ -285,9 +310,12 @@ void sweepTileBy(const Tile& tile) {
 
 void sweepTileRows(const Tile& tile) {
   switch (tile.rule) {
-    case SegmentRule::neighbour: return sweepTileBy<SegmentRule::neighbour>(tile);
-    case SegmentRule::integral: return sweepTileBy<SegmentRule::integral>(tile);
-    case SegmentRule::splitIntegral: return sweepTileBy<SegmentRule::splitIntegral>(tile);
+    case SegmentRule::neighbour:
+      return sweepTileBy<SegmentRule::neighbour>(tile);
+    case SegmentRule::integral:
+      return sweepTileBy<SegmentRule::integral>(tile);
+    case SegmentRule::splitIntegral:
+      return sweepTileBy<SegmentRule::splitIntegral>(tile);
   }
 }
 
@@ -336,9 +364,9 @@ HWY_INLINE void storeFourRuns(const uint8_t* bytes, size_t planeBytes, const Bri
   const __m512i z0 = load(0), z1 = load(1), z2 = load(2), z3 = load(3);
   const __m512i lower01 = _mm512_shuffle_i64x2(z0, z1, 0x44), upper01 = _mm512_shuffle_i64x2(z0, z1, 0xee);
   const __m512i lower23 = _mm512_shuffle_i64x2(z2, z3, 0x44), upper23 = _mm512_shuffle_i64x2(z2, z3, 0xee);
-  const __m512i voxels[4] = {
-      _mm512_shuffle_i64x2(lower01, lower23, 0x88), _mm512_shuffle_i64x2(lower01, lower23, 0xdd),
-      _mm512_shuffle_i64x2(upper01, upper23, 0x88), _mm512_shuffle_i64x2(upper01, upper23, 0xdd)};
+  const __m512i voxels[4] = {_mm512_shuffle_i64x2(lower01, lower23, 0x88), _mm512_shuffle_i64x2(lower01, lower23, 0xdd),
+                             _mm512_shuffle_i64x2(upper01, upper23, 0x88),
+                             _mm512_shuffle_i64x2(upper01, upper23, 0xdd)};
   for (size_t x = 0; x < 4; ++x) {
     const __m512i source = _mm512_load_si512(runs[x].order->source.data());
     _mm512_stream_si512(reinterpret_cast<__m512i*>(plane + runs[x].firstStep),

@@ -21,28 +21,35 @@ inline constexpr FixedDepth kLargestKeptDepth = 0x0fffffff;
 /// Rows are this long or a multiple of it, and have as much room before and behind them.
 inline constexpr int kRowUnit = 16;
 
-/// One plane of a tile. Pointers are to voxel 0 of a row of volume and lie in rows whose room before and behind is 0.
-/// What lies outside the volume is a row of zeros; if a neighbour does, so are both ends of the segment to it.
+/// What changes from plane to plane of a tile.
 struct TilePlane {
-  /// Depths of the neighbours' row, less the step along x: for directions that leave the plane, of the plane before.
-  std::array<const FixedDepth*, kRunEdge> next{};
-  std::array<SegmentTerms, kRunEdge> own{}, neighbour{};
-  FixedDepth* leaving = nullptr;  ///< where the tile's outermost row is copied to, or null
-  uint8_t* bytes = nullptr;       ///< A8: byte x % 4 + 4 * row of the 16 at 4 * (x - x % 4)
+  uint32_t own = 0, neighbour = 0;     ///< entries of Tile::terms at which the voxels' and the neighbours' planes start
+  bool neighbourOutside = false;       ///< the neighbours' plane lies outside the volume
+  const FixedDepth* beyond = nullptr;  ///< depths of Tile::beyondRow's neighbours
+  FixedDepth* leaving = nullptr;       ///< where Tile::leavingRow is copied to, or null
+  uint8_t* bytes = nullptr;            ///< A8: byte x % 4 + 4 * row of the 16 at 4 * (x - x % 4)
 };
 
-/// Depths of four rows, renewed from plane to plane along one direction.
+/// Depths of four rows, renewed from plane to plane along one direction. All rows have room of zeros before and behind
+/// them. Neighbours' rows are given less the step along x.
 struct Tile {
   SegmentRule rule = SegmentRule::neighbour;
+  SegmentTerms terms;
+  /// From the start of a plane to the rows of the voxels and of their neighbours: where a neighbour's row lies outside
+  /// the volume, both to a row of zeros.
+  std::array<uint32_t, kRunEdge> own{}, neighbour{};
+  /// Depths of the neighbours: for directions that leave the plane, of the plane before. Zeros outside the volume.
+  std::array<const FixedDepth*, kRunEdge> next{};
+  int beyondRow = -1;           ///< the row that takes TilePlane::beyond in place of `next`, or none
+  int leavingRow = 0;           ///< the row that neighbours of other tiles will need
   FixedDepth* state = nullptr;  ///< row 0
   size_t stride = 0;            ///< from row to row
   int width = 0;                ///< voxels of a row, rounded up to kRowUnit
   int voxels = 0;               ///< of a row, inside the volume
   int stepX = 0, stepY = 0;
-  bool samePlane = false;               ///< the direction stays in its plane
-  int leavingRow = 0;                   ///< see TilePlane::leaving
-  const uint8_t* wanted = nullptr;      ///< for each kRowUnit voxels: whether their bytes are needed
-  FixedDepth* segments = nullptr;       ///< room for a row, for directions that stay in their plane
+  bool samePlane = false;           ///< the direction stays in its plane
+  const uint8_t* wanted = nullptr;  ///< for each kRowUnit voxels: whether their bytes are needed
+  FixedDepth* segments = nullptr;   ///< room for a row, for directions that stay in their plane
   std::array<TilePlane, kRunEdge> planes{};
   int planeCount = 0;
 };

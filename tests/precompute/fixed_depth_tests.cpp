@@ -70,15 +70,14 @@ TEST(AttenuationCode, rowsAreLikeSingleDepthsForAllDepthsAndInstructionSets) {
   std::vector<FixedDepth> depths(size_t(kStride) * kRunEdge), nothing(kStride);
   std::vector<uint8_t> bytes(size_t(kWidth) * kRunEdge), wanted(kWidth / kRowUnit, 1);
   Tile tile;
+  tile.terms.own = nothing.data() + kRowUnit;
   tile.state = depths.data() + kRowUnit;
   tile.stride = kStride;
   tile.width = tile.voxels = kWidth;
   tile.wanted = wanted.data();
   tile.planeCount = 1;
-  for (size_t row = 0; row < kRunEdge; ++row) {
-    tile.planes[0].next[row] = tile.state + row * kStride;
-    tile.planes[0].own[row].own = tile.planes[0].neighbour[row].own = nothing.data() + kRowUnit;
-  }
+  for (size_t row = 0; row < kRunEdge; ++row)
+    tile.next[row] = tile.state + row * kStride;
   tile.planes[0].bytes = bytes.data();
   for (const int64_t target : test::instructionSets()) {
     const test::InstructionSet chosen(target);
