@@ -262,10 +262,15 @@ class DirectionSweep {
 struct SweepGroup {
   int pass;
   bool ascending;
-  std::vector<DirectionSweep> sweeps;
+  std::vector<int> directions;
+  std::vector<DirectionSweep> sweeps;  ///< made with the first slab, by the thread that uses them
 
   void sweepSlab(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int slab,
                  const SlabBricks& bricks, Scratch& scratch) {
+    if (sweeps.empty()) {
+      for (const int direction : directions)
+        sweeps.emplace_back(direction, shape, segments.rule());
+    }
     const int planes = shape.slabPlanes(slab), first = slab * shape.edge;
     const int order = pass == 0 ? 1 : -1;
     for (int i = 0; i < shape.strips(); ++i) {
@@ -294,7 +299,7 @@ struct SweepGroup {
 };
 
 /// As few groups as keep the threads busy: each computes anew what depends on voxels only.
-std::vector<SweepGroup> makeGroups(const Shape& shape, SegmentRule rule, unsigned passes, int threads) {
+std::vector<SweepGroup> makeGroups(unsigned passes, int threads) {
   const int passCount = std::popcount(passes);
   const bool merge = threads <= passCount;
   const bool split = threads > 3 * passCount;
@@ -306,15 +311,15 @@ std::vector<SweepGroup> makeGroups(const Shape& shape, SegmentRule rule, unsigne
     // Directions within a row go with either order of strips: they join the larger group.
     const int order = y != 0 ? y : merge ? (pass == 0 ? -1 : 1) : 0;
     const auto fits = [&](const SweepGroup& group) {
-      const int other = group.sweeps.front().step().y;
+      const int other = shared::directionY(group.directions.front());
       return !split && group.pass == pass && (merge ? group.ascending == (order <= 0) : other == order);
     };
     auto group = std::find_if(groups.begin(), groups.end(), fits);
-    if (group == groups.end()) group = groups.insert(groups.end(), {pass, order <= 0, {}});
-    group->sweeps.emplace_back(direction, shape, rule);
+    if (group == groups.end()) group = groups.insert(groups.end(), {pass, order <= 0, {}, {}});
+    group->directions.push_back(direction);
   }
   std::stable_sort(groups.begin(), groups.end(),
-                   [](const SweepGroup& a, const SweepGroup& b) { return a.sweeps.size() > b.sweeps.size(); });
+                   [](const SweepGroup& a, const SweepGroup& b) { return a.directions.size() > b.directions.size(); });
   return groups;
 }
 
@@ -334,7 +339,7 @@ void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const Segmen
   check(validDims(dims) && validBrickEdge(edge), "dims and brick edge are valid");
   const Shape shape(dims, edge);
   const int threads = omp_get_max_threads();
-  std::vector<SweepGroup> groups = makeGroups(shape, segments.rule(), passes, threads);
+  std::vector<SweepGroup> groups = makeGroups(passes, threads);
   std::vector<Scratch> scratches;
   for (int i = 0; i < threads; ++i)
     scratches.emplace_back(shape, segments.rule());
@@ -354,7 +359,8 @@ void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const Segmen
       bricks[pass] = sortBricks(shape, sink.begin(pass, slab));
     }
     FirstException failure;
-#pragma omp parallel for schedule(dynamic)
+    // What a group keeps stays near the thread that has always swept it.
+#pragma omp parallel for schedule(static, 1)
     for (size_t i = 0; i < groups.size(); ++i) {
       failure.guard([&] {
         SweepGroup& group = groups[i];
