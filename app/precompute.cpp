@@ -14,6 +14,7 @@
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "splat/pinned_attenuation.h"
+#include "parallel/distributed_precompute.h"
 #include "volume/read_volume.h"
 #include "volume/transfer_presets.h"
 
@@ -105,8 +106,18 @@ Outcome precomputeCommand(PrecomputeCommandOptions options, const CLI::App& comm
   const auto classify = [&](const TransferFunction& transfer) {
     if (transfer.isLabels) options.precompute.classification = labelClassification(options, command);
   };
+  if (options.memory) options.precompute.memoryBytes = *options.memory - std::min(*options.memory / 2, kProgramBytes);
+  if (session.ranks().rankCount() > 1) {
+    if (!options.pins.empty()) throw UsageError("pins are swept by one process: precompute without the launcher");
+    const auto source = openVolume(options.input, options.raw);
+    const TransferFunction transfer = chooseTransfer(options.transfer, source->header());
+    classify(transfer);
+    reportPrecompute(
+        precompute(*source, transfer, options.output, options.precompute, session.ranks(), session.progress()),
+        session);
+    return Outcome::done;
+  }
   if (options.memory) {
-    options.precompute.memoryBytes = *options.memory - std::min(*options.memory / 2, kProgramBytes);
     const auto source = openVolume(options.input, options.raw);
     const TransferFunction transfer = chooseTransfer(options.transfer, source->header());
     classify(transfer);
@@ -178,7 +189,8 @@ Command addPrecompute(CLI::App& program, CommonOptions& common) {
                "again");
   addVolumeOptions(*command, options->raw);
   addCommonOptions(*command, common);
-  return {command, [options, command](Session& session) { return precomputeCommand(*options, *command, session); }};
+  return {command, [options, command](Session& session) { return precomputeCommand(*options, *command, session); },
+          true};
 }
 
 }  // namespace freevoxel

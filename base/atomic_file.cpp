@@ -139,6 +139,19 @@ AtomicFile::AtomicFile(std::string path) : path_(std::move(path)) {
   fchmod(descriptor_, 0666 & ~mask);
 }
 
+AtomicFile AtomicFile::join(std::string path, const std::string& temporaryPath) {
+  AtomicFile file;
+  file.path_ = std::move(path);
+  file.descriptor_ = open(temporaryPath.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
+  if (file.descriptor_ < 0) {
+    throw MachineError(
+        fmt::format("{}: cannot open what another process is writing there: {}; all of them need a folder "
+                    "that they share",
+                    file.path_, std::strerror(errno)));
+  }
+  return file;
+}
+
 AtomicFile::AtomicFile(AtomicFile&& other) noexcept
     : path_(std::move(other.path_)),
       temporaryPath_(std::exchange(other.temporaryPath_, {})),

@@ -15,6 +15,9 @@ class AtomicFile {
   /// Also removes temporary files of the same target that nobody holds. Throws MachineError if the temporary file
   /// cannot be made (directory missing, not writable).
   explicit AtomicFile(std::string path);
+  /// The file that another process makes as temporaryPath(), for writing into it: committing and removing it are left
+  /// to that one. Throws MachineError.
+  static AtomicFile join(std::string path, const std::string& temporaryPath);
   ~AtomicFile();
   AtomicFile(AtomicFile&& other) noexcept;
   AtomicFile& operator=(AtomicFile&&) = delete;
@@ -39,6 +42,8 @@ class AtomicFile {
   void commit();
 
  private:
+  AtomicFile() = default;
+
   std::string path_;
   std::string temporaryPath_;
   int descriptor_ = -1;

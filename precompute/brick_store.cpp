@@ -68,6 +68,14 @@ void CompactStore::wait(size_t section, size_t brick, Frame frame) {
   waiting_[section].push_back({brick, std::move(frame)});
 }
 
+void CompactStore::write(size_t which, uint64_t offset, std::span<const std::byte> frames) {
+  file_.writeAt(sections_[which].offset + offset, frames);
+}
+
+void KeptCompactStore::write(size_t which, uint64_t /*offset*/, std::span<const std::byte> frames) {
+  kept_[which].insert(kept_[which].end(), frames.begin(), frames.end());
+}
+
 void CompactStore::endSlab() {
   for (size_t which = 0; which < sections_.size(); ++which) {
     Section& section = sections_[which];
@@ -80,7 +88,7 @@ void CompactStore::endSlab() {
       joined.insert(joined.end(), frame.begin(), frame.end());
     }
     waiting.clear();
-    file_.writeAt(section.offset + section.bytes, joined);
+    write(which, section.bytes, joined);
     section.bytes += joined.size();
   }
 }

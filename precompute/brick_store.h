@@ -63,7 +63,7 @@ class DenseStore final : public BrickStore {
 
 /// Layout compact: frames (precompute/brick_frames.h) one after another, slab by slab. How long a section becomes is
 /// known only at the end, so each is first written where it has room for the worst.
-class CompactStore final : public BrickStore {
+class CompactStore : public BrickStore {
  public:
   /// A section as it grows.
   struct Section {
@@ -84,6 +84,10 @@ class CompactStore final : public BrickStore {
   /// Where the frames lie; complete once all bricks are.
   std::span<const FrameEntry> frames() const { return frames_; }
 
+ protected:
+  /// Frames that follow each other, `offset` bytes behind the start of section `which`.
+  virtual void write(size_t which, uint64_t offset, std::span<const std::byte> frames);
+
  private:
   AtomicFile& file_;
   std::array<Section, 3> sections_;
@@ -100,6 +104,20 @@ class CompactStore final : public BrickStore {
   std::vector<FrameEntry> frames_;
   std::mutex mutex_;
   std::array<std::vector<Waiting>, 3> waiting_;  ///< of each section
+};
+
+/// The same with the sections in memory, for those whose place in the file is not known before they are complete.
+class KeptCompactStore final : public CompactStore {
+ public:
+  KeptCompactStore(AtomicFile& file, std::span<const StoredBrick> bricks, glm::ivec3 dims, int edge, int bytesPerCode)
+      : CompactStore(file, {}, bricks, dims, edge, bytesPerCode) {}
+  std::span<const std::byte> bytes(size_t which) const { return kept_[which]; }
+
+ protected:
+  void write(size_t which, uint64_t offset, std::span<const std::byte> frames) override;
+
+ private:
+  std::array<std::vector<std::byte>, 3> kept_;
 };
 
 }  // namespace freevoxel

@@ -6,8 +6,11 @@
 #include <array>
 #include <chrono>
 #include <cmath>
+#include <cstring>
+#include <memory>
 #include <new>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -208,6 +211,39 @@ void closeGaps(AtomicFile& file, const CompactStore& store, SectionPlan& plan) {
   file.truncate(plan.fileBytes());
 }
 
+/// All sections but those of bricks, then the header, then the name. Adds to `result`. `frames`: of layout compact.
+void finishFile(AtomicFile& file, const VolumeHeader& header, const TransferFunction& transfer,
+                const PrecomputeOptions& options, const ValueCoding& coding, std::span<const BrickEntry> entries,
+                std::span<const FrameEntry> frames, SectionPlan& plan, PrecomputeResult& result) {
+  const auto [codesType, backwardType, forwardType] = brickSections(options.layout);
+  const std::string transferText = transferFunctionJson(transfer);
+  const auto writeSection = [&](SectionType type, std::span<const std::byte> bytes) {
+    checkEqual(uint64_t(bytes.size()), plan[type].bytes, "bytes of a section");
+    plan[type].hash = contentHash(bytes);
+    file.writeAt(plan[type].offset, bytes);
+  };
+  const std::vector<int8_t> directions = directionTable();
+  const Metadata metadata = describe(header, transfer, options, coding, result);
+  writeSection(section::kMetadata, std::as_bytes(std::span(&metadata, 1)));
+  writeSection(section::kTransfer, std::as_bytes(std::span(transferText)));
+  writeSection(section::kDirections, std::as_bytes(std::span(directions)));
+  writeSection(section::kCommand, std::as_bytes(std::span(options.command)));
+  writeSection(section::kBricks, std::as_bytes(entries));
+  if (options.layout == Layout::compact) writeSection(section::kFrames, std::as_bytes(frames));
+  plan[codesType].hash = brickSectionHash(entries, &BrickEntry::codesHash);
+  plan[backwardType].hash = brickSectionHash(entries, &BrickEntry::backwardHash);
+  plan[forwardType].hash = brickSectionHash(entries, &BrickEntry::forwardHash);
+
+  // The header comes last, when all else is on the disk: without it nothing takes the file for an attenuation file.
+  file.sync();
+  FileHeader fileHeader{kFileMagic, kFileVersion, uint32_t(plan.sections().size()), plan.fileBytes(), 0};
+  fileHeader.hash = headerHash(fileHeader, plan.sections());
+  file.writeAt(sizeof(FileHeader), std::as_bytes(plan.sections()));
+  file.writeAt(0, std::as_bytes(std::span(&fileHeader, 1)));
+  file.commit();
+  result.fileBytes = plan.fileBytes();
+}
+
 /// The file proper, given all that is known before the sweep. Adds its figures to `result`.
 void writeFile(const VolumeHeader& header, const TransferFunction& transfer, CodePlanes& codes, const Survey& survey,
                const PassPlan& passPlan, const std::string& path, const PrecomputeOptions& options, Progress& progress,
@@ -234,31 +270,8 @@ void writeFile(const VolumeHeader& header, const TransferFunction& transfer, Cod
   fillStore(*store, header, transfer, codes, survey, passPlan, options, progress, result);
   if (compact != nullptr) closeGaps(file, *compact, plan);
 
-  const auto writeSection = [&](SectionType type, std::span<const std::byte> bytes) {
-    checkEqual(uint64_t(bytes.size()), plan[type].bytes, "bytes of a section");
-    plan[type].hash = contentHash(bytes);
-    file.writeAt(plan[type].offset, bytes);
-  };
-  const std::vector<int8_t> directions = directionTable();
-  const Metadata metadata = describe(header, transfer, options, survey.coding, result);
-  writeSection(section::kMetadata, std::as_bytes(std::span(&metadata, 1)));
-  writeSection(section::kTransfer, std::as_bytes(std::span(transferText)));
-  writeSection(section::kDirections, std::as_bytes(std::span(directions)));
-  writeSection(section::kCommand, std::as_bytes(std::span(options.command)));
-  writeSection(section::kBricks, std::as_bytes(store->entries()));
-  if (compact != nullptr) writeSection(section::kFrames, std::as_bytes(compact->frames()));
-  plan[codesType].hash = brickSectionHash(store->entries(), &BrickEntry::codesHash);
-  plan[backwardType].hash = brickSectionHash(store->entries(), &BrickEntry::backwardHash);
-  plan[forwardType].hash = brickSectionHash(store->entries(), &BrickEntry::forwardHash);
-
-  // The header comes last, when all else is on the disk: without it nothing takes the file for an attenuation file.
-  file.sync();
-  FileHeader fileHeader{kFileMagic, kFileVersion, uint32_t(plan.sections().size()), plan.fileBytes(), 0};
-  fileHeader.hash = headerHash(fileHeader, plan.sections());
-  file.writeAt(sizeof(FileHeader), std::as_bytes(plan.sections()));
-  file.writeAt(0, std::as_bytes(std::span(&fileHeader, 1)));
-  file.commit();
-  result.fileBytes = plan.fileBytes();
+  finishFile(file, header, transfer, options, survey.coding, store->entries(),
+             compact != nullptr ? compact->frames() : std::span<const FrameEntry>(), plan, result);
   result.writeSeconds = secondsSince(start) - result.sweepSeconds;
 }
 
@@ -385,6 +398,281 @@ PrecomputeResult precomputeChecked(VolumeSource& source, const TransferFunction&
   return result;
 }
 
+/// Codes of the planes that a rank needs, all in memory.
+class KeptCodePlanes final : public CodePlanes {
+ public:
+  KeptCodePlanes(glm::ivec3 dims, PlaneRange range)
+      : planeVoxels_(size_t(dims.x) * size_t(dims.y)),
+        range_(range),
+        codes_(size_t(range.last - range.first) * planeVoxels_) {}
+  std::span<uint16_t> plane(int z) { return span(z, 1); }
+  std::span<const uint16_t> planes(int /*pass*/, int first, int count) override { return span(first, count); }
+
+ private:
+  std::span<uint16_t> span(int first, int count) {
+    check(first >= range_.first && first + count <= range_.last, "planes are this rank's");
+    return std::span(codes_).subspan(size_t(first - range_.first) * planeVoxels_, size_t(count) * planeVoxels_);
+  }
+  size_t planeVoxels_;
+  PlaneRange range_;
+  std::vector<uint16_t> codes_;
+};
+
+/// Wants nothing.
+class NoBricks final : public AttenuationSink {
+ public:
+  std::span<const BrickPlanes> begin(int /*pass*/, int /*slab*/) override { return {}; }
+  void complete(int /*pass*/, int /*slab*/) override {}
+};
+
+/// The slabs of bricks of a rank, first..last-1. The last rank has the last slab.
+struct SlabShare {
+  int first, last;
+  bool empty() const { return first == last; }
+};
+SlabShare slabsOfRank(int slabs, int rank, int rankCount) {
+  return {int(int64_t(slabs) * rank / rankCount), int(int64_t(slabs) * (rank + 1) / rankCount)};
+}
+
+template <class T>
+std::string bytesOf(std::span<const T> values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size_bytes()};
+}
+template <class T>
+void appendFrom(const std::string& bytes, std::vector<T>& values) {
+  const size_t before = values.size();
+  values.resize(before + bytes.size() / sizeof(T));
+  std::memcpy(values.data() + before, bytes.data(), (values.size() - before) * sizeof(T));
+}
+
+/// Reads a rank's planes and finds its bricks.
+Survey surveyShare(VolumeSource& source, const TransferFunction& transfer, int edge, SlabShare share,
+                   const ValueCoding& coding, KeptCodePlanes& planes, Progress& progress) {
+  const VolumeHeader& header = source.header();
+  const glm::ivec3 dims = header.dims;
+  Survey survey;
+  survey.coding = coding;
+  if (share.empty()) return survey;
+  const PlaneRange needed{planesOfSlab(dims, edge, share.first).first, planesOfSlab(dims, edge, share.last - 1).last};
+  Volume slice;
+  slice.header = header;
+  slice.header.dims.z = 1;
+  slice.data.resize(slice.header.bytes());
+  progress.begin("reading", uint64_t(dims.x) * uint64_t(dims.y) * uint64_t(needed.last), "voxels");
+  for (int z = 0; z < needed.last; ++z) {
+    source.readSlices(1, slice.data);
+    progress.advance(slice.header.voxels());
+    if (z < needed.first) continue;
+    const std::vector<uint16_t> codes = encodeValues(slice, coding);
+    std::copy(codes.begin(), codes.end(), planes.plane(z).begin());
+    if (z < share.first * edge || z >= share.last * edge) continue;
+    survey.nonFinite += valueStatistics(slice).nonFinite;
+    survey.largestValueError = std::max(survey.largestValueError, largestCodingError(slice, codes, coding, transfer));
+  }
+  progress.end();
+  const CodeVisibility visibility(transfer, coding);
+  for (int slab = share.first; slab < share.last; ++slab) {
+    const PlaneRange range = planesOfSlab(dims, edge, slab);
+    const auto found =
+        findStoredBricks(planes.planes(0, range.first, range.last - range.first), dims, edge, slab, visibility);
+    survey.bricks.insert(survey.bricks.end(), found.begin(), found.end());
+  }
+  return survey;
+}
+
+/// The survey of the whole volume.
+Survey joinSurveys(const Survey& mine, SlabTeam& team) {
+  struct Figures {
+    uint64_t nonFinite;
+    double largestValueError;
+  } figures{mine.nonFinite, mine.largestValueError};
+  std::vector<Figures> all;
+  for (const std::string& bytes : team.gatherEverywhere(bytesOf(std::span<const Figures>(&figures, 1))))
+    appendFrom(bytes, all);
+  Survey joined;
+  joined.coding = mine.coding;
+  for (const Figures& of : all) {
+    joined.nonFinite += of.nonFinite;
+    joined.largestValueError = std::max(joined.largestValueError, of.largestValueError);
+  }
+  for (const std::string& bytes : team.gatherEverywhere(bytesOf(std::span<const StoredBrick>(mine.bricks))))
+    appendFrom(bytes, joined.bricks);
+  sortAlongCurve(joined.bricks);
+  return joined;
+}
+
+/// Gives every rank the depths that come into its share: an exclusive prefix sum over the ranks along rays, which shift
+/// from plane to plane; what enters by a side starts at 0. `leaving`: what each share takes by itself; used up.
+BorderDepths passOnDepths(BorderDepths leaving, glm::ivec3 dims, int edge, SlabShare share, SlabTeam& team) {
+  const int slabs = brickDims(dims, edge).z;
+  const size_t planeVoxels = size_t(dims.x) * size_t(dims.y);
+  const int planes = std::min(share.last * edge, dims.z) - share.first * edge;
+  BorderDepths incoming;
+  for (auto& depths : incoming)
+    depths.resize(kBorderDirections * planeVoxels);
+  team.agree();
+  if (share.empty()) return incoming;
+  for (int pass = 0; pass < kSweepPasses; ++pass) {
+    // Ranks without slabs are passed over.
+    const auto neighbour = [&](int step) {
+      int rank = team.rank() + step;
+      while (rank >= 0 && rank < team.rankCount() && slabsOfRank(slabs, rank, team.rankCount()).empty())
+        rank += step;
+      return rank >= 0 && rank < team.rankCount() ? rank : -1;
+    };
+    const int before = neighbour(pass == 0 ? -1 : 1), after = neighbour(pass == 0 ? 1 : -1);
+    std::span<FixedDepth> in = incoming[size_t(pass)], out = leaving[size_t(pass)];
+    if (before >= 0) team.receive(before, std::as_writable_bytes(in));
+    if (after < 0) continue;
+    for (size_t i = 0; before >= 0 && i < size_t(kBorderDirections); ++i) {
+      addIncoming(in.subspan(i * planeVoxels, planeVoxels), borderDirection(pass, int(i)), planes, dims,
+                  out.subspan(i * planeVoxels, planeVoxels));
+    }
+    team.send(after, std::as_bytes(out));
+  }
+  return incoming;
+}
+
+/// Bytes that a rank holds with its share: codes, depths at borders and, of layout compact, at worst all frames.
+uint64_t shareBytes(const VolumeHeader& header, const PrecomputeOptions& options, SlabShare share) {
+  const uint64_t planeVoxels = uint64_t(header.dims.x) * uint64_t(header.dims.y);
+  const auto edge = uint64_t(options.brickEdge);
+  const uint64_t slabs = uint64_t(share.last - share.first);
+  return surveyBytes(header, 0) +
+         planeVoxels * (2 * (slabs * edge + 2) + 2 * 2 * kBorderDirections * sizeof(FixedDepth) +
+                        2 * edge * kDirectionsPerSection) +
+         (options.layout == Layout::compact
+              ? slabs * (planeVoxels / (edge * edge) + 1) * 2 * largestFrame(passFaceBytes(options.brickEdge))
+              : 0) +
+         sweepBytes(header.dims, options.brickEdge, kSweepPasses, omp_get_max_threads());
+}
+
+PrecomputeResult precomputeTogether(VolumeSource& source, const TransferFunction& transfer, const std::string& path,
+                                    const PrecomputeOptions& options, SlabTeam& team, Progress& progress) {
+  const auto start = Clock::now();
+  const VolumeHeader header = source.header();
+  const glm::ivec3 dims = header.dims;
+  const int edge = options.brickEdge;
+  const SlabShare share = slabsOfRank(brickDims(dims, edge).z, team.rank(), team.rankCount());
+  const uint64_t needed = shareBytes(header, options, share);
+  if (options.memoryBytes != 0 && needed > options.memoryBytes) failForMemory(path, needed, options);
+
+  const ValueCoding coding = valueCoding(header.type, transfer.low, transfer.high);
+  PlaneRange kept;
+  if (!share.empty()) {
+    kept = {planesOfSlab(dims, edge, share.first).first, planesOfSlab(dims, edge, share.last - 1).last};
+  }
+  KeptCodePlanes planes(dims, kept);
+  const Survey mine = surveyShare(source, transfer, edge, share, coding, planes, progress);
+  team.agree();
+  const Survey survey = joinSurveys(mine, team);
+  PrecomputeResult result = resultOf(header, survey, edge);
+
+  const auto segments = makeSegmentDepth(options.classification, transfer, coding);
+  const auto sweepStart = Clock::now();
+  SweepPart part{share.first, share.last, {}, true};
+  NoBricks nothing;
+  part.incoming = passOnDepths(sweepPart(planes, dims, edge, *segments, nothing, 3u, part), dims, edge, share, team);
+  part.bordersOnly = false;
+
+  // Rank 0 makes the file, the others write into it.
+  std::unique_ptr<AtomicFile> file;
+  if (team.rank() == 0) file = std::make_unique<AtomicFile>(path);
+  team.agree();
+  const std::string temporary = team.gatherEverywhere(file ? file->temporaryPath() : "")[0];
+  if (!file) file = std::make_unique<AtomicFile>(AtomicFile::join(path, temporary));
+  SectionPlan plan = planSections(options, coding, survey.bricks.size(), transferFunctionJson(transfer));
+  const auto sections = brickSections(options.layout);
+  std::unique_ptr<BrickStore> store;
+  KeptCompactStore* compact = nullptr;
+  if (options.layout == Layout::dense) {
+    if (team.rank() == 0) file->reserve(plan.fileBytes());
+    store = std::make_unique<DenseStore>(
+        *file, DenseStore::Offsets{plan[sections[0]].offset, plan[sections[1]].offset, plan[sections[2]].offset},
+        survey.bricks, edge, coding.bytes());
+  } else {
+    auto made = std::make_unique<KeptCompactStore>(*file, survey.bricks, dims, edge, coding.bytes());
+    compact = made.get();
+    store = std::move(made);
+  }
+  team.agree();
+
+  BrickWriter writer(*store, survey.bricks, dims, edge, [&](uint64_t voxels) { progress.advance(voxels); });
+  for (int slab = share.first; slab < share.last; ++slab) {
+    const int first = slab * edge;
+    writer.writeCodes(slab, planes.planes(0, first, std::min(edge, dims.z - first)), coding);
+  }
+  const int ownPlanes = share.empty() ? 0 : std::min(share.last * edge, dims.z) - share.first * edge;
+  progress.begin("attenuation", voxelCount({dims.x, dims.y, ownPlanes}) * shared::kDirectionCount, "voxels");
+  sweepPart(planes, dims, edge, *segments, writer, 3u, part);
+  progress.end();
+  result.sweepSeconds = secondsSince(sweepStart) - writer.writeSeconds();
+  team.agree();
+
+  // Frames of codes and of backward faces come in the order of the ranks, those of forward faces in the opposite one.
+  std::array<uint64_t, 3> offsets{};
+  if (compact != nullptr) {
+    std::array<uint64_t, 3> sizes{};
+    for (size_t which = 0; which < sizes.size(); ++which)
+      sizes[which] = compact->bytes(which).size();
+    std::vector<std::array<uint64_t, 3>> all;
+    for (const std::string& bytes : team.gatherEverywhere(bytesOf(std::span<const std::array<uint64_t, 3>>(&sizes, 1))))
+      appendFrom(bytes, all);
+    for (size_t which = 0; which < sizes.size(); ++which) {
+      uint64_t total = 0;
+      for (int rank = 0; rank < team.rankCount(); ++rank) {
+        const uint64_t bytes = all[size_t(rank)][which];
+        total += bytes;
+        if (which == 2 ? rank > team.rank() : rank < team.rank()) offsets[which] += bytes;
+      }
+      plan[sections[which]].bytes = total;
+    }
+    plan.place();
+    if (team.rank() == 0) file->reserve(plan.fileBytes());
+    team.agree();
+    for (size_t which = 0; which < sizes.size(); ++which)
+      file->writeAt(plan[sections[which]].offset + offsets[which], compact->bytes(which));
+  }
+  // All must be on the disk before the header is.
+  if (team.rank() != 0) file->sync();
+
+  std::vector<BrickEntry> entries(store->entries().begin(), store->entries().end()), ownEntries;
+  std::vector<FrameEntry> frames, ownFrames;
+  if (compact != nullptr) frames.assign(compact->frames().begin(), compact->frames().end());
+  const auto owns = [&](size_t brick, SlabShare slabs) {
+    const int slab = survey.bricks[brick].position.z;
+    return slab >= slabs.first && slab < slabs.last;
+  };
+  for (size_t brick = 0; brick < entries.size(); ++brick) {
+    if (!owns(brick, share)) continue;
+    ownEntries.push_back(entries[brick]);
+    if (compact == nullptr) continue;
+    ownFrames.push_back(frames[brick]);
+    for (size_t which = 0; which < offsets.size(); ++which)
+      ownFrames.back().offset[which] += offsets[which];
+  }
+  team.agree();
+  const auto collect = [&](const auto& own, auto& all) {
+    const std::vector<std::string> bytes = team.gatherEverywhere(bytesOf(std::span(own)));
+    for (int rank = 0; rank < team.rankCount(); ++rank) {
+      std::decay_t<decltype(all)> theirs;
+      appendFrom(bytes[size_t(rank)], theirs);
+      const SlabShare slabs = slabsOfRank(brickDims(dims, edge).z, rank, team.rankCount());
+      size_t next = 0;
+      for (size_t brick = 0; brick < all.size(); ++brick) {
+        if (owns(brick, slabs)) all[brick] = theirs[next++];
+      }
+    }
+  };
+  collect(ownEntries, entries);
+  if (compact != nullptr) collect(ownFrames, frames);
+  if (team.rank() == 0) finishFile(*file, header, transfer, options, coding, entries, frames, plan, result);
+  team.agree();
+  result.fileBytes = plan.fileBytes();
+  result.writeSeconds = secondsSince(start) - result.sweepSeconds;
+  return result;
+}
+
 /// Calls f; no memory becomes an error that says of what.
 template <class F>
 PrecomputeResult withMemoryErrors(const VolumeHeader& header, const std::string& path, F&& f) {
@@ -416,6 +704,13 @@ PrecomputeResult precompute(VolumeSource& source, const TransferFunction& transf
   checkOptions(options, path);
   return withMemoryErrors(source.header(), path,
                           [&] { return precomputeChecked(source, transfer, path, options, progress); });
+}
+
+PrecomputeResult precompute(VolumeSource& source, const TransferFunction& transfer, const std::string& path,
+                            const PrecomputeOptions& options, SlabTeam& team, Progress& progress) {
+  checkOptions(options, path);
+  return withMemoryErrors(source.header(), path,
+                          [&] { return precomputeTogether(source, transfer, path, options, team, progress); });
 }
 
 }  // namespace freevoxel

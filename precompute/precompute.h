@@ -6,6 +6,7 @@
 
 #include "base/progress.h"
 #include "precompute/format.h"
+#include "precompute/slab_team.h"
 #include "volume/read_volume.h"
 #include "volume/transfer_function.h"
 #include "volume/volume.h"
@@ -46,5 +47,13 @@ PrecomputeResult precompute(const Volume& volume, const TransferFunction& transf
 /// at once.
 PrecomputeResult precompute(VolumeSource& source, const TransferFunction& transfer, const std::string& path,
                             const PrecomputeOptions& options, Progress& progress);
+
+/// The same file, written by several processes at once, which all call this with the same arguments, a source of their
+/// own, and a folder that they share. A rank reads `source` as far as its own slabs of bricks go, and holds their
+/// codes; it sweeps them twice, first for what leaves them (DESIGN section 6). The bytes do not depend on the number of
+/// ranks. Every rank is told the whole result. options.memoryBytes bounds every rank. Throws as above on the rank that
+/// fails; the team's own exception on the others; no file appears then.
+PrecomputeResult precompute(VolumeSource& source, const TransferFunction& transfer, const std::string& path,
+                            const PrecomputeOptions& options, SlabTeam& team, Progress& progress);
 
 }  // namespace freevoxel

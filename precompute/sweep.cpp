@@ -181,6 +181,17 @@ class DirectionSweep {
   }
 
   glm::ivec3 step() const { return step_; }
+  int direction() const { return direction_; }
+
+  /// Depths of the last plane swept, dims.x * dims.y: of directions that leave planes.
+  void setDepths(const Shape& shape, const FixedDepth* depths) {
+    for (int y = 0; y < shape.dims.y; ++y)
+      std::copy_n(depths + size_t(y) * size_t(shape.dims.x), shape.dims.x, state_.row(y));
+  }
+  void getDepths(const Shape& shape, FixedDepth* depths) {
+    for (int y = 0; y < shape.dims.y; ++y)
+      std::copy_n(state_.row(y), shape.dims.x, depths + size_t(y) * size_t(shape.dims.x));
+  }
 
   /// Before the first tile of a strip. Strips come from the outside inwards: ascending where the direction points down
   /// in y, descending where it points up.
@@ -258,6 +269,12 @@ class DirectionSweep {
   Tile tile_;  ///< at hand
 };
 
+/// Where a direction's plane starts in BorderDepths.
+size_t borderOffset(const Shape& shape, int direction) {
+  const int place = direction - borderDirection(sweepPass(direction), 0);
+  return size_t(place) * size_t(shape.dims.x) * size_t(shape.dims.y);
+}
+
 /// Directions that one thread sweeps together: all strips of a slab, in one order.
 struct SweepGroup {
   int pass;
@@ -266,10 +283,14 @@ struct SweepGroup {
   std::vector<DirectionSweep> sweeps;  ///< made with the first slab, by the thread that uses them
 
   void sweepSlab(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int slab,
-                 const SlabBricks& bricks, Scratch& scratch) {
+                 const SlabBricks& bricks, const std::vector<FixedDepth>& incoming, Scratch& scratch) {
     if (sweeps.empty()) {
-      for (const int direction : directions)
+      for (const int direction : directions) {
         sweeps.emplace_back(direction, shape, segments.rule());
+        if (sweeps.back().step().z != 0 && !incoming.empty()) {
+          sweeps.back().setDepths(shape, incoming.data() + borderOffset(shape, direction));
+        }
+      }
     }
     const int planes = shape.slabPlanes(slab), first = slab * shape.edge;
     const int order = pass == 0 ? 1 : -1;
@@ -299,14 +320,14 @@ struct SweepGroup {
 };
 
 /// As few groups as keep the threads busy: each computes anew what depends on voxels only.
-std::vector<SweepGroup> makeGroups(unsigned passes, int threads) {
+std::vector<SweepGroup> makeGroups(unsigned passes, bool bordersOnly, int threads) {
   const int passCount = std::popcount(passes);
   const bool merge = threads <= passCount;
   const bool split = threads > 3 * passCount;
   std::vector<SweepGroup> groups;
   for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
     const int pass = sweepPass(direction);
-    if ((passes >> pass & 1u) == 0) continue;
+    if ((passes >> pass & 1u) == 0 || (bordersOnly && shared::directionZ(direction) == 0)) continue;
     const int y = shared::directionY(direction);
     // Directions within a row go with either order of strips: they join the larger group.
     const int order = y != 0 ? y : merge ? (pass == 0 ? -1 : 1) : 0;
@@ -323,6 +344,52 @@ std::vector<SweepGroup> makeGroups(unsigned passes, int threads) {
   return groups;
 }
 
+/// Gives the groups as they are after the last slab.
+std::vector<SweepGroup> sweepSlabs(CodePlanes& codes, const Shape& shape, const SegmentDepth& segments,
+                                   AttenuationSink& sink, unsigned passes, const SweepPart& part) {
+  check(validDims(shape.dims) && validBrickEdge(shape.edge), "dims and brick edge are valid");
+  check(0 <= part.firstSlab && part.firstSlab <= part.lastSlab && part.lastSlab <= shape.slabs(), "slabs are there");
+  const int threads = omp_get_max_threads();
+  std::vector<SweepGroup> groups = makeGroups(passes, part.bordersOnly, threads);
+  std::vector<Scratch> scratches;
+  for (int i = 0; i < threads; ++i)
+    scratches.emplace_back(shape, segments.rule());
+
+  // Both passes run at once, one from each end.
+  for (int step = 0; step < part.lastSlab - part.firstSlab; ++step) {
+    const int slabs[kSweepPasses] = {part.firstSlab + step, part.lastSlab - 1 - step};
+    CodeSlab slabCodes[kSweepPasses];
+    SlabBricks bricks[kSweepPasses];
+    for (int pass = 0; pass < kSweepPasses; ++pass) {
+      if ((passes >> pass & 1u) == 0) continue;
+      const int slab = slabs[pass];
+      const int first = slab * shape.edge, last = first + shape.slabPlanes(slab);
+      const int from = pass == 0 ? std::max(first - 1, 0) : first;
+      const int to = pass == 0 ? last : std::min(last + 1, shape.dims.z);
+      slabCodes[pass] = {codes.planes(pass, from, to - from).data(), from};
+      bricks[pass] = sortBricks(shape, sink.begin(pass, slab));
+    }
+    FirstException failure;
+    // What a group keeps stays near the thread that has always swept it.
+#pragma omp parallel for schedule(static, 1)
+    for (size_t i = 0; i < groups.size(); ++i) {
+      failure.guard([&] {
+        SweepGroup& group = groups[i];
+        group.sweepSlab(shape, segments, slabCodes[group.pass], slabs[group.pass], bricks[group.pass],
+                        part.incoming[size_t(group.pass)], scratches[size_t(omp_get_thread_num())]);
+      });
+    }
+    failure.rethrow();
+    for (int pass = 0; pass < kSweepPasses; ++pass) {
+      if ((passes >> pass & 1u) != 0) sink.complete(pass, slabs[pass]);
+    }
+  }
+  for (int pass = 0; pass < kSweepPasses; ++pass) {
+    if ((passes >> pass & 1u) != 0) codes.release(pass);
+  }
+  return groups;
+}
+
 }  // namespace
 
 StoredCodePlanes::StoredCodePlanes(std::span<const uint16_t> codes, glm::ivec3 dims)
@@ -336,45 +403,33 @@ std::span<const uint16_t> StoredCodePlanes::planes(int /*pass*/, int first, int 
 
 void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments, AttenuationSink& sink,
                       unsigned passes) {
-  check(validDims(dims) && validBrickEdge(edge), "dims and brick edge are valid");
-  const Shape shape(dims, edge);
-  const int threads = omp_get_max_threads();
-  std::vector<SweepGroup> groups = makeGroups(passes, threads);
-  std::vector<Scratch> scratches;
-  for (int i = 0; i < threads; ++i)
-    scratches.emplace_back(shape, segments.rule());
+  sweepSlabs(codes, Shape(dims, edge), segments, sink, passes, {0, Shape(dims, edge).slabs(), {}, false});
+}
 
-  // Both passes run at once, one from each end.
-  for (int step = 0; step < shape.slabs(); ++step) {
-    const int slabs[kSweepPasses] = {step, shape.slabs() - 1 - step};
-    CodeSlab slabCodes[kSweepPasses];
-    SlabBricks bricks[kSweepPasses];
-    for (int pass = 0; pass < kSweepPasses; ++pass) {
-      if ((passes >> pass & 1u) == 0) continue;
-      const int slab = slabs[pass];
-      const int first = slab * edge, last = first + shape.slabPlanes(slab);
-      const int from = pass == 0 ? std::max(first - 1, 0) : first;
-      const int to = pass == 0 ? last : std::min(last + 1, dims.z);
-      slabCodes[pass] = {codes.planes(pass, from, to - from).data(), from};
-      bricks[pass] = sortBricks(shape, sink.begin(pass, slab));
-    }
-    FirstException failure;
-    // What a group keeps stays near the thread that has always swept it.
-#pragma omp parallel for schedule(static, 1)
-    for (size_t i = 0; i < groups.size(); ++i) {
-      failure.guard([&] {
-        SweepGroup& group = groups[i];
-        group.sweepSlab(shape, segments, slabCodes[group.pass], slabs[group.pass], bricks[group.pass],
-                        scratches[size_t(omp_get_thread_num())]);
-      });
-    }
-    failure.rethrow();
-    for (int pass = 0; pass < kSweepPasses; ++pass) {
-      if ((passes >> pass & 1u) != 0) sink.complete(pass, slabs[pass]);
+BorderDepths sweepPart(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments,
+                       AttenuationSink& sink, unsigned passes, const SweepPart& part) {
+  const Shape shape(dims, edge);
+  std::vector<SweepGroup> groups = sweepSlabs(codes, shape, segments, sink, passes, part);
+  BorderDepths outgoing;
+  for (SweepGroup& group : groups) {
+    auto& depths = outgoing[size_t(group.pass)];
+    depths.resize(size_t(kBorderDirections) * size_t(dims.x) * size_t(dims.y));
+    for (DirectionSweep& sweep : group.sweeps) {
+      if (sweep.step().z != 0) sweep.getDepths(shape, depths.data() + borderOffset(shape, sweep.direction()));
     }
   }
-  for (int pass = 0; pass < kSweepPasses; ++pass) {
-    if ((passes >> pass & 1u) != 0) codes.release(pass);
+  return outgoing;
+}
+
+void addIncoming(std::span<const FixedDepth> incoming, int direction, int planes, glm::ivec3 dims,
+                 std::span<FixedDepth> own) {
+  const int64_t stepX = int64_t(shared::directionX(direction)) * planes;
+  const int64_t stepY = int64_t(shared::directionY(direction)) * planes;
+  for (int64_t y = std::max<int64_t>(0, -stepY); y < std::min<int64_t>(dims.y, dims.y - stepY); ++y) {
+    for (int64_t x = std::max<int64_t>(0, -stepX); x < std::min<int64_t>(dims.x, dims.x - stepX); ++x) {
+      FixedDepth& depth = own[size_t(y * dims.x + x)];
+      depth = std::min(saturatingSum(depth, incoming[size_t((y + stepY) * dims.x + x + stepX)]), kLargestKeptDepth);
+    }
   }
 }
 

@@ -2,11 +2,14 @@
 // brick planes in curve order: a voxel's depth is its neighbour's, one step further out, plus the segment between them.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
 #include <span>
+#include <vector>
 
 #include "precompute/segment_depth.h"
+#include "shaders/shared/directions.h"
 
 namespace freevoxel {
 
@@ -59,11 +62,37 @@ class AttenuationSink {
   virtual void complete(int pass, int slab) = 0;
 };
 
+/// For each pass, depths of one plane along its nine directions that leave planes, ascending: dims.x * dims.y each, x
+/// fastest. Empty: 0.
+using BorderDepths = std::array<std::vector<FixedDepth>, kSweepPasses>;
+inline constexpr int kBorderDirections = 9;
+/// The direction that has place `i` in there.
+constexpr int borderDirection(int pass, int i) {
+  return pass == 0 ? i : shared::kDirectionCount - kBorderDirections + i;
+}
+
+/// Some slabs of bricks, swept by themselves.
+struct SweepPart {
+  int firstSlab = 0, lastSlab = 0;  ///< firstSlab..lastSlab-1
+  BorderDepths incoming;  ///< of the planes before the part, in the order of each pass; not used at the border
+  /// Directions that stay within their planes are left out: for the sake of what leaves the part.
+  bool bordersOnly = false;
+};
+
 /// Sweeps the directions of the passes `passes` (bit 0, bit 1) over bricks of `edge` voxels; both at once if both are
 /// asked for. A voxel whose neighbour lies outside the volume has depth 0, A8 = 255.
 /// What the sink receives depends neither on the number of threads nor on the instruction set. Takes sweepBytes().
 void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments, AttenuationSink& sink,
                       unsigned passes = 3);
+
+/// The same for a part of the volume; gives the depths of its last planes, in the order of each pass. Without incoming
+/// depths those are what the part alone takes: saturating sums, to which depths that come in later can be added.
+BorderDepths sweepPart(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments,
+                       AttenuationSink& sink, unsigned passes, const SweepPart& part);
+
+/// What leaves a part of so many planes along a direction: `own`, what it takes itself, plus `incoming`, moved along.
+void addIncoming(std::span<const FixedDepth> incoming, int direction, int planes, glm::ivec3 dims,
+                 std::span<FixedDepth> own);
 
 /// Memory that sweepAttenuation takes beside codes and brick planes: 36 bytes per voxel of an xy plane and pass, and
 /// per voxel along x about 70 edge bytes for each pass and 100 edge for each thread.

@@ -323,7 +323,7 @@ TransferFunction chooseTransfer(const std::string& nameOrPath, const VolumeHeade
   if (preset || isTableWithoutValues(nameOrPath)) {
     throw InputError(
         fmt::format("{}: a transfer function made from the volume's values needs them all in memory; make a file of it "
-                    "with `freevoxel transfer`, or leave out --memory",
+                    "with `freevoxel transfer`, or run one process without --memory",
                     nameOrPath));
   }
   const TransferFunction transfer = readTransferFunction(nameOrPath);

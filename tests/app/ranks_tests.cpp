@@ -64,6 +64,32 @@ class RanksOfProgram : public ::testing::Test {
 
 constexpr const char* kView = " --size 61x43 --orbit 35,25 ";
 
+/// More ranks than slabs of bricks among them.
+TEST_F(RanksOfProgram, PrecomputeTheSameBytes) {
+  for (const std::string options : {"--layout dense --classification voxel --brick 8", "--layout compact --brick 8",
+                                    "--layout compact --classification voxel", "--layout dense"}) {
+    // The command stands in the file.
+    const std::string call = "precompute cloud.nrrd --transfer t.json -o shared.fvx " + options;
+    run(call);
+    const std::string expected = readBytes(folder + "/shared.fvx");
+    for (const int rankCount : {2, 3, 5, 8}) {
+      std::filesystem::remove(folder + "/shared.fvx");
+      runRanks(rankCount, call);
+      EXPECT_EQ(readBytes(folder + "/shared.fvx"), expected) << rankCount << ' ' << options;
+    }
+  }
+}
+
+TEST_F(RanksOfProgram, LeaveNoFileIfOneFailsToPrecompute) {
+  const std::string call = "precompute cloud.nrrd --transfer t.json -o no.fvx";
+  expectFailure(mpirun(folder, 2, words(call), 1, words("precompute none.nrrd --transfer t.json -o no.fvx")),
+                "rank 2: none.nrrd");
+  expectFailure(mpirun(folder, 2, words("precompute cloud.nrrd --transfer t.json -o none/no.fvx")),
+                "rank 0: none/no.fvx");
+  expectFailure(mpirun(folder, 2, words("precompute cloud.nrrd --transfer auto -o no.fvx")),
+                "needs them all in memory");
+}
+
 TEST_F(RanksOfProgram, DrawTheSameBits) {
   const std::string plain = std::string("render cloud.fvx") + kView;
   const std::string lit =

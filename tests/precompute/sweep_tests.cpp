@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <cstdlib>
+#include <random>
 #include <span>
 #include <vector>
 
@@ -237,6 +238,61 @@ TEST(SweepOrder, aPassCompletesSlabAfterSlabAndFillsWhatIsWanted) {
       for (uint64_t i = 0; i < found.size(); ++i) {
         const uint64_t x = i % uint64_t(dims.x) / 8, y = i / uint64_t(dims.x) % uint64_t(dims.y) / 8;
         ASSERT_EQ(found[i], (x + y) % 2 == 0 ? expected[size_t(direction)][i] : 77);
+      }
+    }
+  }
+}
+
+/// Wants nothing.
+class NoSink final : public AttenuationSink {
+ public:
+  std::span<const BrickPlanes> begin(int /*pass*/, int /*slab*/) override { return {}; }
+  void complete(int /*pass*/, int /*slab*/) override {}
+};
+
+/// What each part takes by itself, passed on from part to part, is what comes into the next one; and parts that start
+/// from that fill their bricks as the whole does.
+TEST(SweepParts, joinToTheWhole) {
+  const glm::ivec3 dims(13, 29, 61);
+  const int edge = 8;
+  const TransferFunction transfer = test::veilAndRamp();
+  for (const auto classification : {Classification::voxel, Classification::preintegrated}) {
+    for (const ValueType type : {ValueType::u8, ValueType::u16}) {
+      // Thin enough to reach through several parts, thick enough to saturate here and there.
+      std::mt19937 random(5);
+      const auto volume = test::makeVolume<uint16_t>(
+          ValueType::u16, dims, [&](int, int, int) { return uint16_t(random() % 8 == 0 ? random() % 256 : 110); });
+      const ValueCoding coding = valueCoding(type, transfer.low, type == ValueType::u8 ? transfer.high : 1000.0);
+      const auto codes = encodeValues(volume, coding);
+      const auto segments = makeSegmentDepth(classification, transfer, coding);
+      const Planes expected = sweepAll(codes, dims, *segments, edge);
+      StoredCodePlanes planes(codes, dims);
+      const std::vector<int> cuts = {0, 1, 4, 5, 8};
+      const size_t parts = cuts.size() - 1, planeVoxels = size_t(dims.x) * size_t(dims.y);
+      std::vector<BorderDepths> leaving, incoming(parts);
+      NoSink nothing;
+      for (size_t i = 0; i < parts; ++i) {
+        leaving.push_back(sweepPart(planes, dims, edge, *segments, nothing, 3u, {cuts[i], cuts[i + 1], {}, true}));
+      }
+      for (int pass = 0; pass < kSweepPasses; ++pass) {
+        for (size_t i = 0; i + 1 < parts; ++i) {
+          const size_t from = pass == 0 ? i : parts - 1 - i, to = pass == 0 ? from + 1 : from - 1;
+          auto& out = leaving[from][size_t(pass)];
+          const auto& in = incoming[from][size_t(pass)];
+          const int length = std::min(cuts[from + 1] * edge, dims.z) - cuts[from] * edge;
+          for (size_t k = 0; k < size_t(kBorderDirections) && !in.empty(); ++k) {
+            addIncoming(std::span(in).subspan(k * planeVoxels, planeVoxels), borderDirection(pass, int(k)), length,
+                        dims, std::span(out).subspan(k * planeVoxels, planeVoxels));
+          }
+          incoming[to][size_t(pass)] = out;
+        }
+      }
+      test::MemorySink sink(dims, edge);
+      for (size_t i = 0; i < parts; ++i)
+        sweepPart(planes, dims, edge, *segments, sink, 3u, {cuts[i], cuts[i + 1], incoming[i], false});
+      for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
+        bool outside = false;
+        ASSERT_EQ(sink.volumeOrder(direction, outside), expected[size_t(direction)]) << direction;
       }
     }
   }
