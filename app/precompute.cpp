@@ -13,8 +13,8 @@
 #include "app/precompute_report.h"
 #include "base/atomic_file.h"
 #include "base/error.h"
-#include "splat/pinned_attenuation.h"
 #include "parallel/distributed_precompute.h"
+#include "splat/pinned_attenuation.h"
 #include "volume/read_volume.h"
 #include "volume/transfer_presets.h"
 
