@@ -93,6 +93,7 @@ nlohmann::ordered_json describe(const AttenuationFile& file, Histogram& histogra
   json["layout"] = layoutName(file.layout());
   json["classification"] = classificationName(file.classification());
   json["levels"] = file.levels();
+  json["hierarchy"] = hierarchyName(file.hierarchy());
   json["bricks"] = file.brickCount();
   json["pins"] = nlohmann::ordered_json::array();
   for (const Pin& pin : file.pinned().pins())
@@ -104,8 +105,10 @@ nlohmann::ordered_json describe(const AttenuationFile& file, Histogram& histogra
   json["occupancy"] = double(file.storedVoxels()) / double(voxels);
   json["valueBytes"] = file.codeBytes();
   json["attenuationBytes"] = file.attenuationBytes();
+  json["levelBytes"] = file.levelBytes();
   json["valueBytesPerVoxel"] = per(file.codeBytes(), voxels);
   json["attenuationBytesPerVoxel"] = per(file.attenuationBytes(), voxels);
+  json["levelBytesPerVoxel"] = per(file.levelBytes(), voxels);
   json["valueBytesPerStoredVoxel"] = per(file.codeBytes(), file.storedVoxels());
   json["attenuationBytesPerStoredVoxel"] = per(file.attenuationBytes(), file.storedVoxels());
   return json;
@@ -246,10 +249,11 @@ Command addInfo(CLI::App& program, CommonOptions& common) {
       "--json", options->json,
       "print JSON: dims, spacing, origin, direction (of each axis), bounds (world), type, range, sum, "
       "nonFinite, fileBytes; for an attenuation "
-      "file also layout, classification, levels, bricks, pins (each a direction or a position, world), pinBytes, "
-      "storedVoxels, occupancy (their share), "
-      "valueBytes, attenuationBytes, and both per voxel of the volume (...PerVoxel) and per stored voxel "
-      "(...PerStoredVoxel) (there sum is over stored voxels); of meshes and spheres what is in them, what "
+      "file also layout, classification, levels, hierarchy, bricks, pins (each a direction or a position, world), "
+      "pinBytes, storedVoxels, occupancy (their share), "
+      "valueBytes, attenuationBytes (both of the finest level), levelBytes (of all others), and these per voxel of the "
+      "volume (...PerVoxel) and the first two per stored voxel (...PerStoredVoxel) (there sum is over stored voxels); "
+      "of meshes and spheres what is in them, what "
       "was left out, and the first 64 materials");
   addVolumeOptions(*command, options->raw);
   addCommonOptions(*command, common);

@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "app/command.h"
+#include "app/level_options.h"
 #include "app/parse.h"
 #include "app/precompute_report.h"
 #include "base/atomic_file.h"
@@ -30,14 +32,18 @@ struct PrecomputeCommandOptions {
   PrecomputeOptions precompute;
 };
 
-/// Of --memory, what the program takes beside the volume: libraries, threads' stacks, tables.
-constexpr uint64_t kProgramBytes = uint64_t(128) << 20;
-
 uint64_t parseMemory(std::string_view text) {
   constexpr uint64_t kLeast = uint64_t(64) << 20;
   const uint64_t bytes = parseBytes(text);
   if (bytes < kLeast) throw UsageError(fmt::format("expected at least 64M, found '{}'", text));
   return bytes;
+}
+
+int parseLevels(std::string_view text) {
+  const double levels = parseNumber(text);
+  if (!(levels >= 0.0 && levels <= 32.0) || levels != std::floor(levels))
+    throw UsageError(fmt::format("expected a whole number from 0 to 32, found {}", text));
+  return int(levels);
 }
 
 /// Between two labels there is nothing to integrate.
@@ -106,7 +112,7 @@ Outcome precomputeCommand(PrecomputeCommandOptions options, const CLI::App& comm
   const auto classify = [&](const TransferFunction& transfer) {
     if (transfer.isLabels) options.precompute.classification = labelClassification(options, command);
   };
-  if (options.memory) options.precompute.memoryBytes = *options.memory - std::min(*options.memory / 2, kProgramBytes);
+  if (options.memory) options.precompute.memoryBytes = withoutProgram(*options.memory);
   if (session.ranks().rankCount() > 1) {
     if (!options.pins.empty()) throw UsageError("pins are swept by one process: precompute without the launcher");
     const auto source = openVolume(options.input, options.raw);
@@ -142,6 +148,8 @@ void reportPrecompute(const PrecomputeResult& result, Session& session) {
   session.statistics["visibleVoxels"] = result.visibleVoxels;
   session.statistics["nonFinite"] = result.nonFinite;
   session.statistics["blocks"] = result.bricks;
+  session.statistics["levels"] = result.levels;
+  session.statistics["levelBytes"] = result.levelBytes;
   session.statistics["fileBytes"] = result.fileBytes;
   session.statistics["bytesPerVoxel"] = double(result.fileBytes) / double(result.voxels);
   session.statistics["largestValueError"] = result.largestValueError;
@@ -175,6 +183,14 @@ Command addPrecompute(CLI::App& program, CommonOptions& common) {
                     "how attenuation is stored: all of it, or the faces of bricks, compressed");
   addChoice<int>(*command, "--brick", options->precompute.brickEdge, {{"8", 8}, {"16", 16}, {"32", 32}},
                  "edge of a brick in voxels");
+  addParsed<int>(*command, "--levels", options->precompute.levels, "N",
+                 "levels of detail, the finest included; 0 for as many as it takes until one brick holds the volume "
+                 "(default 1)",
+                 parseLevels);
+  addChoice<Hierarchy>(*command, "--hierarchy", options->precompute.hierarchy,
+                       {{"geometric", Hierarchy::geometric}, {"weighted", Hierarchy::weighted}},
+                       "attenuation of a coarser level: the geometric mean of eight voxels, or their mean weighted by "
+                       "opacity");
   addParsed(
       *command, "--memory", options->memory, "BYTES",
       "take no more memory than this, 64M or more, for the whole run: the volume is read in slices, and its codes "

@@ -9,6 +9,7 @@
 
 #include "app/command.h"
 #include "app/input_file.h"
+#include "app/level_options.h"
 #include "app/light_options.h"
 #include "app/picture_output.h"
 #include "app/precompute_report.h"
@@ -87,8 +88,10 @@ void checkOptions(const RenderOptions& options, const CLI::App& command) {
       if (!allowed && given(name)) throw UsageError(fmt::format("{} needs --formula {}", name, formulas));
     }
   };
-  onlyWith(hasSums(options.formula), {"--order", "--backend", "--sums", "--footprint", "--attenuation", "--cull"},
-           "normalised, direct or paper");
+  onlyWith(
+      hasSums(options.formula),
+      {"--order", "--backend", "--sums", "--footprint", "--attenuation", "--cull", "--lod", "--gpu-memory", "--memory"},
+      "normalised, direct or paper");
   onlyWith(options.formula != PictureFormula::raycast, {"--light-attenuation"}, "normalised, direct, paper or blended");
   onlyWith(options.formula == PictureFormula::raycast, {"--raycast", "--step", "--shadow-step"}, "raycast");
   onlyWith(options.formula == PictureFormula::blended, {"--blend-kernel"}, "blended");
@@ -129,7 +132,7 @@ TransferFunction transferFor(const AttenuationFile& file, const std::string& pat
   return transfer;
 }
 
-void report(const SplatStatistics& statistics, const ValueGrid& grid, const AttenuationFile* file, Session& session) {
+void report(const SplatStatistics& statistics, glm::ivec3 dims, const AttenuationFile* file, Session& session) {
   session.addSeconds("attenuation", statistics.attenuationSeconds);
   session.addSeconds("light", statistics.lightSeconds);
   session.addSeconds("setup", statistics.setupSeconds);
@@ -138,11 +141,11 @@ void report(const SplatStatistics& statistics, const ValueGrid& grid, const Atte
   if (!statistics.glRenderer.empty()) session.statistics["glRenderer"] = statistics.glRenderer;
   if (!statistics.attenuation.empty()) session.statistics["attenuation"] = statistics.attenuation;
   if (!statistics.lightAttenuation.empty()) session.statistics["lightAttenuation"] = statistics.lightAttenuation;
-  session.statistics["voxels"] = voxelCount(grid.dims);
+  session.statistics["voxels"] = voxelCount(dims);
   if (file != nullptr) {
     session.statistics["storedVoxels"] = file->storedVoxels();
     session.statistics["fileBytes"] = file->fileBytes();
-    session.statistics["bytesPerVoxel"] = double(file->fileBytes()) / double(voxelCount(grid.dims));
+    session.statistics["bytesPerVoxel"] = double(file->fileBytes()) / double(voxelCount(dims));
     session.statistics["nonFinite"] = file->nonFinite();
   }
   session.statistics["splats"] = statistics.splats;
@@ -152,6 +155,7 @@ void report(const SplatStatistics& statistics, const ValueGrid& grid, const Atte
   session.statistics["blocks"] = statistics.blocks;
   session.statistics["culledBlocks"] = statistics.culledBlocks;
   session.statistics["hiddenBlocks"] = statistics.hiddenBlocks;
+  reportLevels(statistics, session);
 }
 
 /// The name of one of several pictures: "turn.png" -> "turn_0007.png".
@@ -163,9 +167,9 @@ std::string frameName(const std::string& path, int frame) {
 
 /// Draws the picture, or those of a turn about world y, and writes them on rank 0. `draw(camera)`: the picture, and if
 /// there are any its sums.
-void drawFrames(const RenderOptions& options, const ValueGrid& grid, Session& session,
+void drawFrames(const RenderOptions& options, const Box& bounds, Session& session,
                 const std::function<Image(const Camera& camera, std::optional<Sums>& sums)>& draw) {
-  const Camera first = makeCamera(options.camera, worldBounds(grid.placement, grid.dims));
+  const Camera first = makeCamera(options.camera, bounds);
   nlohmann::ordered_json seconds = nlohmann::ordered_json::array(), hashes = nlohmann::ordered_json::array();
   for (int frame = 0; frame < std::max(1, options.frames); ++frame) {
     const auto start = std::chrono::steady_clock::now();
@@ -192,35 +196,42 @@ void drawFrames(const RenderOptions& options, const ValueGrid& grid, Session& se
 }
 
 void drawRays(const ValueGrid& grid, const TransferFunction& transfer, const RenderOptions& options, Session& session) {
-  drawFrames(options, grid, session, [&](const Camera& camera, std::optional<Sums>&) {
+  const Box bounds = worldBounds(grid.placement, grid.dims);
+  drawFrames(options, bounds, session, [&](const Camera& camera, std::optional<Sums>&) {
     return session.timed("raycast",
                          [&] { return raycast(grid, transfer, camera, options.raycast, session.progress()); });
   });
 }
 
-/// `file` may be null: then attenuation is swept.
-void drawSplats(const ValueGrid& grid, const AttenuationFile* file, TransferFunction transfer,
-                const RenderOptions& options, Session& session) {
+/// Either may be null: without `file` attenuation is swept, without `grid` values are read as they are needed.
+void drawSplats(const ValueGrid* grid, const AttenuationFile* file, TransferFunction transfer, RenderOptions options,
+                Session& session) {
+  const glm::ivec3 dims = grid != nullptr ? grid->dims : file->dims();
+  const Box bounds = worldBounds(grid != nullptr ? grid->placement : file->placement(), dims);
+  if (options.splat.memoryBytes > 0) options.splat.memoryBytes = withoutProgram(options.splat.memoryBytes);
   expectSameOnAllRanks(session.ranks(),
-                       file != nullptr ? file->identity() : contentHash(std::as_bytes(std::span(grid.codes))),
+                       file != nullptr ? file->identity() : contentHash(std::as_bytes(std::span(grid->codes))),
                        options.input);
   if (options.share.colourByRank) {
     for (TransferPoint& point : transfer.points)
       point.srgb = glm::dvec3(1.0);
   }
-  Splatter splatter = session.timed("open", [&] { return Splatter(grid, file, transfer, options.backend); });
+  Splatter splatter = session.timed("open", [&] {
+    return grid != nullptr ? Splatter(*grid, file, transfer, options.backend)
+                           : Splatter(*file, transfer, options.backend);
+  });
   if (options.formula == PictureFormula::blended) {
-    drawFrames(options, grid, session, [&](const Camera& camera, std::optional<Sums>&) {
+    drawFrames(options, bounds, session, [&](const Camera& camera, std::optional<Sums>&) {
       BlendedResult result = splatter.renderBlended(camera, options.blendKernel, options.splat, session.progress());
-      report(result.statistics, grid, file, session);
+      report(result.statistics, dims, file, session);
       return std::move(result.image);
     });
     return;
   }
   SharedDrawing drawing(splatter, options.share, options.camera.imageSize, session);
-  drawFrames(options, grid, session, [&](const Camera& camera, std::optional<Sums>& sums) {
+  drawFrames(options, bounds, session, [&](const Camera& camera, std::optional<Sums>& sums) {
     SplatResult result = drawing.render(camera, options.splat);
-    report(result.statistics, grid, file, session);
+    report(result.statistics, dims, file, session);
     session.statistics["passes"] = result.statistics.passes;
     session.statistics["quantum"] = result.sums.quantum;
     sums = std::move(result.sums);
@@ -235,9 +246,9 @@ void drawFile(RenderOptions options, const CLI::App& command, Session& session) 
   const AttenuationFile file(options.input);
   const TransferFunction transfer = transferFor(file, options.transfer);
   if (transfer.isLabels) keepLabelsApart(options, command);
+  if (options.formula != PictureFormula::raycast) return drawSplats(nullptr, &file, transfer, options, session);
   const ValueGrid grid = session.timed("read", [&] { return valueGrid(file); });
-  if (options.formula == PictureFormula::raycast) return drawRays(grid, transfer, options, session);
-  drawSplats(grid, &file, transfer, options, session);
+  drawRays(grid, transfer, options, session);
 }
 
 /// Whether a picture takes the 26 stored directions.
@@ -268,7 +279,7 @@ void drawVolume(RenderOptions options, const CLI::App& command, Session& session
     session.statistics["voxels"] = volume.header.voxels();
     return drawRays(grid, transfer, options, session);
   }
-  if (!needsFile(options)) return drawSplats(grid, nullptr, transfer, options, session);
+  if (!needsFile(options)) return drawSplats(&grid, nullptr, transfer, options, session);
   session.tell("precomputing into a temporary file; `freevoxel precompute` keeps it for the next picture");
   // Never committed, so it goes when this function ends.
   const AtomicFile scratch(options.picture.output + ".fvx");
@@ -279,7 +290,7 @@ void drawVolume(RenderOptions options, const CLI::App& command, Session& session
   reportPrecompute(precompute(volume, transfer, scratch.temporaryPath(), precomputeOptions, session.progress()),
                    session);
   const AttenuationFile file(scratch.temporaryPath());
-  return drawSplats(grid, &file, transfer, options, session);
+  return drawSplats(&grid, &file, transfer, options, session);
 }
 
 Outcome render(RenderOptions options, const CLI::App& command, Session& session) {
@@ -357,8 +368,11 @@ Command addRender(CLI::App& program, CommonOptions& common) {
   addChoice<AttenuationSource>(*command, "--light-attenuation", options->splat.lightAttenuation, sources,
                                "the same for light on its way from the lamps; auto takes a pin that is the lamp, else "
                                "stored with an attenuation file and the lamp outside, else swept");
-  addChoice<Cull>(*command, "--cull", options->splat.cull, {{"none", Cull::none}, {"hidden", Cull::hidden}},
-                  "leave out what hardly any light reaches the eye from");
+  addChoice<Cull>(*command, "--cull", options->splat.cull,
+                  {{"off", Cull::off}, {"none", Cull::none}, {"hidden", Cull::hidden}},
+                  "leave out nothing, only what adds nothing to the picture (the bits are the same), or also what "
+                  "hardly any light reaches the eye from");
+  addLevelOptions(*command, options->splat);
   addChoice<Backend>(*command, "--backend", options->backend,
                      {{"auto", Backend::automatic}, {"gl", Backend::gl}, {"cpu", Backend::cpu}},
                      "what draws splats; the bits are the same");

@@ -76,7 +76,7 @@ std::vector<SharedBlock> sharedBlocks(std::span<const VisibleBlock> blocks) {
   std::vector<SharedBlock> shared;
   shared.reserve(blocks.size());
   for (const VisibleBlock& block : blocks)
-    shared.push_back({0, block.origin.z, block.visibleCells});
+    shared.push_back({block.level, block.origin.z, block.visibleCells});
   return shared;
 }
 
@@ -94,15 +94,19 @@ void expectSameOnAllRanks(const Ranks& ranks, uint64_t identity, const std::stri
 }
 
 SharedDrawing::SharedDrawing(Splatter& splatter, const ShareOptions& options, glm::ivec2 imageSize, Session& session)
-    : splatter_(splatter), options_(options), session_(session), compositor_(session.ranks(), imageSize, kSumChannels) {
-  const Ranks& ranks = session.ranks();
-  if (ranks.rankCount() == 1) return;
-  share_ = shareOf(dealBlocks(sharedBlocks(splatter.blocks()), options.partition, ranks.rankCount()), ranks.rank());
-}
+    : splatter_(splatter),
+      options_(options),
+      session_(session),
+      compositor_(session.ranks(), imageSize, kSumChannels) {}
 
 SplatResult SharedDrawing::render(const Camera& camera, const SplatOptions& options) {
   const Ranks& ranks = session_.ranks();
   splatter_.prepare(camera, options);
+  // What is to be drawn may depend on the view.
+  std::vector<uint8_t> share;
+  if (ranks.rankCount() > 1) {
+    share = shareOf(dealBlocks(sharedBlocks(splatter_.blocks()), options_.partition, ranks.rankCount()), ranks.rank());
+  }
   const std::array<float, 3> colour = [&] {
     std::array<float, 3> linear{};
     for (int c = 0; c < 3; ++c)
@@ -110,7 +114,7 @@ SplatResult SharedDrawing::render(const Camera& camera, const SplatOptions& opti
     return linear;
   }();
   for (float quantum = options.firstQuantum;; quantum = nextQuantum(quantum)) {
-    Sums sums = splatter_.draw(quantum, share_, session_.progress());
+    Sums sums = splatter_.draw(quantum, share, session_.progress());
     if (options_.colourByRank) tint(sums, {colour[0], colour[1], colour[2]});
     ranks.agree();
     const auto start = std::chrono::steady_clock::now();

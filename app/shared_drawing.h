@@ -36,11 +36,11 @@ std::vector<SharedBlock> sharedBlocks(std::span<const VisibleBlock> blocks);
 /// Draws frames of one size. Everything here is collective.
 class SharedDrawing {
  public:
-  /// All must outlive this. Throws InputError if the ranks do not see the same blocks or the partition will not do.
+  /// All must outlive this.
   SharedDrawing(Splatter& splatter, const ShareOptions& options, glm::ivec2 imageSize, Session& session);
 
   /// Sums and statistics: on rank 0 the sums of all, elsewhere of no use; statistics of this rank. The same bits for
-  /// any number of ranks. Throws as Splatter::render does, and RankFailed.
+  /// any number of ranks. Throws as Splatter::render does, RankFailed, and InputError if the partition will not do.
   SplatResult render(const Camera& camera, const SplatOptions& options);
 
   /// Fills statistics "ranks" with what every rank did in all frames; nothing for one rank.
@@ -50,7 +50,6 @@ class SharedDrawing {
   Splatter& splatter_;
   const ShareOptions& options_;
   Session& session_;
-  std::vector<uint8_t> share_;
   Compositor compositor_;
   SplatStatistics total_;
   double compositeSeconds_ = 0.0;

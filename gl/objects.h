@@ -4,6 +4,7 @@
 #include <epoxy/gl.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <glm/vec2.hpp>
 #include <span>
 #include <utility>
@@ -40,17 +41,41 @@ using Framebuffer = Object<deleteFramebuffer>;
 using VertexArray = Object<deleteVertexArray>;
 using Program = Object<deleteProgram>;
 
+/// Bytes of all buffers and textures that are alive, and the most that were at once since resetPeakBytes().
+uint64_t liveBytes();
+uint64_t peakBytes();
+void resetPeakBytes();
+
+/// So many bytes that are alive.
+class CountedBytes {
+ public:
+  CountedBytes() = default;
+  explicit CountedBytes(uint64_t bytes);
+  ~CountedBytes();
+  CountedBytes(CountedBytes&& other) noexcept : bytes_(std::exchange(other.bytes_, 0)) {}
+  CountedBytes& operator=(CountedBytes&& other) noexcept {
+    std::swap(bytes_, other.bytes_);
+    return *this;
+  }
+  uint64_t value() const { return bytes_; }
+
+ private:
+  uint64_t bytes_ = 0;
+};
+
 /// A buffer of fixed size, for data that the CPU writes again and again.
 class Buffer : public Object<deleteBuffer> {
  public:
   Buffer() = default;
   explicit Buffer(size_t bytes);
-  size_t bytes() const { return bytes_; }
+  size_t bytes() const { return size_t(bytes_.value()); }
   /// Replaces the first data.size() bytes; what is being drawn from the old contents still sees them.
   void replace(std::span<const std::byte> data);
+  /// Writes bytes from `offset` on. Nothing that is being drawn may read them.
+  void write(size_t offset, std::span<const std::byte> data);
 
  private:
-  size_t bytes_ = 0;
+  CountedBytes bytes_;
 };
 
 /// A two-dimensional texture without mipmaps, all zero.
@@ -63,6 +88,26 @@ class Texture2D : public Object<deleteTexture> {
 
  private:
   glm::ivec2 size_{0};
+  CountedBytes bytes_;
+};
+
+/// Tells when the commands before it are done. Move-only.
+class Fence {
+ public:
+  Fence() = default;
+  ~Fence();
+  Fence(Fence&& other) noexcept : sync_(std::exchange(other.sync_, nullptr)) {}
+  Fence& operator=(Fence&& other) noexcept {
+    std::swap(sync_, other.sync_);
+    return *this;
+  }
+  /// After all commands so far.
+  static Fence here();
+  /// Returns when they are done; at once if this is empty.
+  void wait();
+
+ private:
+  GLsync sync_ = nullptr;
 };
 
 Framebuffer makeFramebuffer(std::span<const Texture2D* const> colourAttachments);

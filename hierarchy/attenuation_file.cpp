@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/grid.h"
+#include "hierarchy/file_reading.h"
 #include "precompute/brick_faces.h"
 #include "precompute/brick_frames.h"
 #include "precompute/checksums.h"
@@ -20,57 +21,27 @@ namespace freevoxel {
 
 namespace {
 
-std::string_view text(const SectionType& type) {
-  return {type.data(), type.size()};
-}
-
-/// Printable whatever bytes a damaged file holds.
-std::string quoted(const SectionType& type) {
-  std::string result;
-  for (const char c : type) {
-    result += c > ' ' && c < 127 ? std::string(1, c) : fmt::format("\\x{:02x}", static_cast<unsigned char>(c));
-  }
-  return result;
-}
-
-template <class Expected, class Found>
-InputError mismatch(const std::string& path, uint64_t offset, std::string_view what, const Expected& expected,
-                    const Found& found) {
-  return InputError(fmt::format("{}: at byte {}: {}: expected {}, found {}", path, offset, what, expected, found));
-}
-
-/// A copy of T from a map; `offset + sizeof(T)` lies inside.
-template <class T>
-T copyAt(std::span<const std::byte> bytes, uint64_t offset) {
-  T value;
-  std::memcpy(&value, bytes.data() + offset, sizeof(T));
-  return value;
-}
-
-template <class T>
-std::vector<T> copyOf(std::span<const std::byte> bytes) {
-  std::vector<T> items(bytes.size() / sizeof(T));
-  if (!items.empty()) std::memcpy(items.data(), bytes.data(), items.size() * sizeof(T));
-  return items;
-}
-
 constexpr std::array<SectionType, 3> kDenseBricks = {section::kCodes, section::kBackward, section::kForward};
 constexpr std::array<SectionType, 3> kCompactBricks = {section::kPackedCodes, section::kPackedBackward,
                                                        section::kPackedForward};
+
+constexpr std::array<SectionType, 3> kLevelBricks = {section::kLevelMatter, section::kLevelBackward,
+                                                     section::kLevelForward};
 
 bool isAmong(std::span<const SectionType> types, const SectionType& type) {
   return std::find(types.begin(), types.end(), type) != types.end();
 }
 
 bool isKnown(const SectionType& type) {
-  constexpr SectionType kOthers[] = {section::kMetadata, section::kTransfer,  section::kDirections,
-                                     section::kBricks,   section::kFrames,    section::kCommand,
-                                     section::kPins,     section::kPinFrames, section::kPackedPins};
-  return isAmong(kOthers, type) || isAmong(kDenseBricks, type) || isAmong(kCompactBricks, type);
+  constexpr SectionType kOthers[] = {
+      section::kMetadata, section::kTransfer, section::kDirections, section::kBricks,     section::kFrames,
+      section::kCommand,  section::kPins,     section::kPinFrames,  section::kPackedPins, section::kLevels};
+  return isAmong(kOthers, type) || isAmong(kDenseBricks, type) || isAmong(kCompactBricks, type) ||
+         isAmong(kLevelBricks, type);
 }
 
 bool holdsBrickData(const SectionType& type) {
-  return isAmong(kDenseBricks, type) || isAmong(kCompactBricks, type);
+  return isAmong(kDenseBricks, type) || isAmong(kCompactBricks, type) || isAmong(kLevelBricks, type);
 }
 
 uint32_t largestCode(std::span<const std::byte> codes, int bytesPerCode) {
@@ -98,6 +69,7 @@ AttenuationFile::AttenuationFile(const std::string& path) : path_(path), map_(pa
   readDirections();
   readBricks();
   readPins();
+  readLevels();
   checkIntact();
 }
 
@@ -223,8 +195,12 @@ void AttenuationFile::readMetadata() {
          offsetof(Metadata, classification), "classification", "0 or 1", uint32_t(m.classification));
   expect(m.layout == Layout::dense || m.layout == Layout::compact, offsetof(Metadata, layout), "layout",
          "0, dense, or 1, compact", uint32_t(m.layout));
-  expect(m.levels == 1, offsetof(Metadata, levels), "levels", "1", m.levels);
-  expect(m.zero0 == 0, offsetof(Metadata, zero0), "reserved field", "0", m.zero0);
+  const int mostLevels = mostHierarchyLevels(dims(), int(m.brickEdge));
+  expect(m.levels >= 1 && m.levels <= uint32_t(mostLevels), offsetof(Metadata, levels), "levels",
+         fmt::format("1 to {}", mostLevels), m.levels);
+  expect(m.hierarchy == Hierarchy::geometric || (m.hierarchy == Hierarchy::weighted && m.levels > 1),
+         offsetof(Metadata, hierarchy), "hierarchy", m.levels > 1 ? "0, geometric, or 1, weighted" : "0",
+         uint32_t(m.hierarchy));
   expect(m.zero1 == 0, offsetof(Metadata, zero1), "reserved field", "0", m.zero1);
   const uint64_t voxels = voxelCount(dims());
   expect(m.voxels == voxels, offsetof(Metadata, voxels), "voxels", fmt::format("{}", voxels), m.voxels);
@@ -363,38 +339,10 @@ void AttenuationFile::readFrames() {
 }
 
 void AttenuationFile::checkFrames(size_t which) const {
-  const SectionEntry& section = required(brickSections()[which]);
-  if (section.items != frames_.size()) {
-    throw mismatch(path_, section.offset, fmt::format("items of {}", text(section.type)), frames_.size(),
-                   section.items);
-  }
-  const auto at = [&](size_t i, size_t field, size_t fieldBytes) {
-    return required(section::kFrames).offset + i * sizeof(FrameEntry) + field + which * fieldBytes;
-  };
-  std::vector<size_t> byOffset(frames_.size());
-  std::iota(byOffset.begin(), byOffset.end(), size_t(0));
-  std::sort(byOffset.begin(), byOffset.end(), [&](size_t a, size_t b) {
-    return std::pair(frames_[a].offset[which], frames_[a].bytes[which]) <
-           std::pair(frames_[b].offset[which], frames_[b].bytes[which]);
-  });
-  uint64_t end = 0;
-  for (const size_t i : byOffset) {
-    const FrameEntry& frame = frames_[i];
-    if (frame.offset[which] != end) {
-      throw mismatch(path_, at(i, offsetof(FrameEntry, offset), sizeof(uint64_t)),
-                     fmt::format("offset of brick {} in {}", i, text(section.type)), end, frame.offset[which]);
-    }
-    if (frame.bytes[which] > section.bytes - end) {
-      throw mismatch(path_, at(i, offsetof(FrameEntry, bytes), sizeof(uint32_t)),
-                     fmt::format("bytes of brick {} in {}", i, text(section.type)),
-                     fmt::format("at most {}", section.bytes - end), frame.bytes[which]);
-    }
-    end += frame.bytes[which];
-  }
-  if (end != section.bytes) {
-    throw mismatch(path_, section.offset, fmt::format("bytes of the frames of {}", text(section.type)), section.bytes,
-                   end);
-  }
+  checkFrameList(
+      path_, required(brickSections()[which]), frames_.size(), required(section::kFrames).offset, sizeof(FrameEntry),
+      [&](size_t i) { return std::pair(frames_[i].offset[which], frames_[i].bytes[which]); },
+      offsetof(FrameEntry, offset) + which * sizeof(uint64_t), offsetof(FrameEntry, bytes) + which * sizeof(uint32_t));
 }
 
 std::array<SectionType, 3> AttenuationFile::brickSections() const {
@@ -550,6 +498,7 @@ void AttenuationFile::verify() const {
   for (size_t i = 0; i < bricks_.size(); ++i)
     verifyBrick(i);
   pinned_.verify();
+  verifyLevels();
   checkIntact();
 }
 

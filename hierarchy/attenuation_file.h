@@ -21,18 +21,22 @@
 
 namespace freevoxel {
 
-/// One stored brick of the finest level, valid as long as the AttenuationFile: views into the map (layout dense) or
+/// One stored brick, valid as long as the AttenuationFile: views into the map (layout dense) or
 /// into memory of its own (compact). Move-only. Planes hold edge^3 entries in curve order (see `curve`). Voxels of the
 /// brick that lie outside the volume have code 0 and attenuation 255 and must be skipped: origin + curve[i] >= dims.
 struct BrickView {
   uint64_t hilbertIndex = 0;  ///< of the brick among bricks
-  glm::ivec3 origin{0};       ///< its first voxel
+  glm::ivec3 origin{0};       ///< its first voxel, of its level
   int edge = 16;              ///< voxels
+  int level = 0;
   uint32_t visibleVoxels = 0;
   std::span<const LocalPosition> curve;  ///< step along the curve -> place in the brick
   std::span<const uint16_t> steps;       ///< local linear index (x fastest) -> step along the curve
   int bytesPerCode = 1;
-  const std::byte* codes = nullptr;  ///< value codes, 1 or 2 bytes each, little-endian
+  const std::byte* codes = nullptr;  ///< value codes, 1 or 2 bytes each, little-endian; null from level 1 on
+  /// From level 1 on: linear red, green and blue, 65535 for 1, and extinction as IEEE binary16, in log2 per shortest
+  /// edge of the finest level; else null.
+  const uint16_t* matter[kMatterPlanes] = {};
   /// Per direction index: round(255 * A), in layout compact off by one at most; null unless asked for.
   const uint8_t* attenuations[26] = {};
   std::unique_ptr<std::byte[]> unpacked;  ///< what the above point into, if not the map
@@ -58,6 +62,7 @@ class AttenuationFile {
   Classification classification() const { return metadata_.classification; }
   Layout layout() const { return metadata_.layout; }
   int levels() const { return int(metadata_.levels); }
+  Hierarchy hierarchy() const { return metadata_.hierarchy; }  ///< of levels from 1 on
   int brickEdge() const { return int(metadata_.brickEdge); }
   uint64_t fileBytes() const { return map_.bytes().size(); }
   uint64_t storedVoxels() const { return metadata_.storedVoxels; }          ///< of the volume, in stored bricks
@@ -74,12 +79,24 @@ class AttenuationFile {
 
   size_t brickCount() const { return bricks_.size(); }  ///< stored bricks, sorted along the Hilbert curve
   glm::ivec3 brickOrigin(size_t i) const;               ///< its first voxel
+  uint32_t visibleVoxelsOf(size_t i) const { return bricks_[i].visibleVoxels; }  ///< of brick i
   /// Codes and the attenuation along `directions`. Layout compact unpacks them here, at a cost for every direction.
   /// Throws InputError if that brick is damaged, which layout dense does not notice.
   BrickView brick(size_t i, DirectionSet directions = kAllDirections) const;
   /// Position in brick() order of the brick at `brickPosition` (voxel / brickEdge), or nothing if it is not stored (or
   /// lies outside the volume).
   std::optional<size_t> findBrick(glm::ivec3 brickPosition) const;
+
+  /// The same of any level, 0 <= level < levels(): voxels, stored bricks, their first voxels.
+  glm::ivec3 levelDims(int level) const;
+  size_t levelBrickCount(int level) const;
+  glm::ivec3 levelBrickOrigin(int level, size_t i) const;
+  BrickView levelBrick(int level, size_t i, DirectionSet directions = kAllDirections) const;
+  std::optional<size_t> findLevelBrick(int level, glm::ivec3 brickPosition) const;
+  uint64_t levelBytes() const;  ///< that levels from 1 on take in the file, the directory left out
+
+  /// Tells the system that a brick will be read soon.
+  void prefetch(int level, size_t i) const;
 
   /// Throws InputError if the file was cut or could not be read since it was opened. Whoever has used bricks calls it
   /// before he relies on them.
@@ -107,6 +124,12 @@ class AttenuationFile {
   /// Throws InputError naming the frame unless the frames of a section fill it.
   void checkFrames(size_t which) const;
   void checkBrickSection(SectionType type, uint64_t bytesPerBrick) const;
+  void readLevels();
+  void readLevelEntries(const SectionEntry& section);
+  /// Bytes of entry `entry` of LEVL in section `which` of LMAT, LATB and LATF.
+  std::span<const std::byte> storedLevel(size_t which, const LevelEntry& entry) const;
+  void verifyLevels() const;
+  void verifyLevelEntry(size_t entry) const;
 
   /// The sections of codes, of directions 0..12 and of 13..25.
   std::array<SectionType, 3> brickSections() const;
@@ -134,6 +157,9 @@ class AttenuationFile {
   std::vector<BrickEntry> bricks_;
   std::vector<FrameEntry> frames_;  ///< of layout compact
   std::array<std::span<const std::byte>, 3> brickData_;
+  std::vector<LevelEntry> levelEntries_;  ///< of levels from 1 on
+  std::vector<size_t> levelStarts_;       ///< by level, where its entries start, and their end; [0] unused
+  std::array<std::span<const std::byte>, 3> levelData_;
   std::unique_ptr<const BrickRegeneration> regeneration_;  ///< of layout compact
   PinnedPlanes pinned_;
 };

@@ -5,47 +5,42 @@
 
 #include "base/error.h"
 #include "base/first_exception.h"
+#include "hierarchy/absent_bricks.h"
 
 namespace freevoxel {
 
 namespace {
 
-/// Gives bricks that are not stored one code each, spreading outwards from the stored ones.
-///
-/// A stored voxel next to an absent one shares an invisible cell with it, so both lie in one interval of values that is
-/// invisible throughout; and absent voxels that touch lie in one such interval too. Any code from that interval is
-/// therefore as good as the lost one, and a neighbour's is in it.
-void fillAbsentBricks(ValueGrid& grid, std::vector<uint8_t> known, glm::ivec3 bricks, int edge) {
-  std::vector<glm::ivec3> front;
-  for (int z = 0; z < bricks.z; ++z) {
-    for (int y = 0; y < bricks.y; ++y) {
-      for (int x = 0; x < bricks.x; ++x) {
-        if (known[linearIndex({x, y, z}, bricks)] != 0) front.emplace_back(x, y, z);
-      }
-    }
-  }
-  for (size_t next = 0; next < front.size(); ++next) {
-    const glm::ivec3 from = front[next];
-    for (int n = 0; n < 27; ++n) {
-      const glm::ivec3 step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
-      const glm::ivec3 to = from + step;
-      if (glm::clamp(to, glm::ivec3(0), bricks - 1) != to || known[linearIndex(to, bricks)] != 0) continue;
-      known[linearIndex(to, bricks)] = 1;
-      front.push_back(to);
-      const glm::ivec3 first = to * edge;
-      const glm::ivec3 last = glm::min(first + edge, grid.dims) - 1;
-      // The voxel of `from` that touches `to`.
-      const glm::ivec3 fromFirst = from * edge;
-      const glm::ivec3 fromLast = glm::min(fromFirst + edge, grid.dims) - 1;
-      const uint16_t code = grid.codes[linearIndex(glm::clamp(first, fromFirst, fromLast), grid.dims)];
-      for (int z = first.z; z <= last.z; ++z) {
-        for (int y = first.y; y <= last.y; ++y) {
-          std::fill_n(grid.codes.begin() + int64_t(linearIndex({first.x, y, z}, grid.dims)), last.x - first.x + 1,
-                      code);
+/// Gives bricks that are not stored one code each.
+void fillAbsentBricks(ValueGrid& grid, const std::vector<uint8_t>& stored, glm::ivec3 bricks, int edge) {
+  std::vector<CornerCodes> corners(stored.size());
+  const auto forEachBrick = [&](bool wanted, auto&& use) {
+    for (int z = 0; z < bricks.z; ++z) {
+      for (int y = 0; y < bricks.y; ++y) {
+        for (int x = 0; x < bricks.x; ++x) {
+          const uint64_t i = linearIndex({x, y, z}, bricks);
+          const glm::ivec3 first = glm::ivec3(x, y, z) * edge;
+          if ((stored[i] != 0) == wanted) use(i, first, glm::min(first + edge, grid.dims) - 1);
         }
       }
     }
-  }
+  };
+  forEachBrick(true, [&](uint64_t i, glm::ivec3 first, glm::ivec3 last) {
+    for (size_t corner = 0; corner < 8; ++corner) {
+      const glm::ivec3 p((corner & 1) ? last.x : first.x, (corner & 2) ? last.y : first.y,
+                         (corner & 4) ? last.z : first.z);
+      corners[i][corner] = grid.codes[linearIndex(p, grid.dims)];
+    }
+  });
+  const std::vector<uint16_t> codes = absentBrickCodes(bricks, stored, corners);
+  forEachBrick(false, [&](uint64_t i, glm::ivec3 first, glm::ivec3 last) {
+    for (int z = first.z; z <= last.z; ++z) {
+      for (int y = first.y; y <= last.y; ++y) {
+        std::fill_n(grid.codes.begin() + int64_t(linearIndex({first.x, y, z}, grid.dims)), last.x - first.x + 1,
+                    codes[i]);
+      }
+    }
+  });
 }
 
 }  // namespace
@@ -88,7 +83,7 @@ ValueGrid valueGrid(const AttenuationFile& file) {
       file.checkIntact();
     });
   failure.rethrow();
-  fillAbsentBricks(grid, std::move(known), bricks, edge);
+  fillAbsentBricks(grid, known, bricks, edge);
   return grid;
 }
 

@@ -89,6 +89,10 @@ std::span<const BrickPlanes> BrickWriter::begin(int pass, int slab) {
   return wanted;
 }
 
+LevelTarget BrickWriter::levels(int pass, int /*slab*/) {
+  return levels_ != nullptr ? levels_->target(pass) : LevelTarget{};
+}
+
 void BrickWriter::complete(int pass, int slab) {
   const auto start = std::chrono::steady_clock::now();
   const std::vector<size_t>& bricks = slabs_[size_t(slab)];
@@ -102,6 +106,11 @@ void BrickWriter::complete(int pass, int slab) {
   }
   failure.rethrow();
   store_.endSlab();
+  if (levels_ != nullptr) {
+    const int first = slab * edge_, count = std::min(edge_, dims_.z - first);
+    levels_->addDepths(pass, slab,
+                       levels_->weighted() ? codes_->planes(pass, first, count) : std::span<const uint16_t>());
+  }
   const glm::ivec3 slabDims(dims_.x, dims_.y, std::min(edge_, dims_.z - slab * edge_));
   const bool last = pass == 0 ? size_t(slab) + 1 == slabs_.size() : slab == 0;
   if (last) planes_[size_t(pass)] = {};

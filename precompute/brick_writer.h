@@ -11,6 +11,7 @@
 
 #include "precompute/brick_store.h"
 #include "precompute/format.h"
+#include "precompute/level_builder.h"
 #include "precompute/stored_bricks.h"
 #include "precompute/sweep.h"
 #include "volume/value_codes.h"
@@ -30,6 +31,12 @@ class BrickWriter final : public AttenuationSink {
   void writeCodes(int slab, std::span<const uint16_t> codes, const ValueCoding& coding);
 
   std::span<const BrickPlanes> begin(int pass, int slab) override;
+  /// Gives level 1 on to `levels`, which must outlive the writer; `codes`: what is swept.
+  void buildLevels(LevelBuilder& levels, CodePlanes& codes) {
+    levels_ = &levels;
+    codes_ = &codes;
+  }
+  LevelTarget levels(int pass, int slab) override;
   /// Throws MachineError.
   void complete(int pass, int slab) override;
 
@@ -59,6 +66,8 @@ class BrickWriter final : public AttenuationSink {
   std::array<std::vector<Line>, kSweepPasses> planes_;
   std::array<std::vector<BrickPlanes>, kSweepPasses> wanted_;
   double writeSeconds_ = 0.0;
+  LevelBuilder* levels_ = nullptr;
+  CodePlanes* codes_ = nullptr;
 };
 
 }  // namespace freevoxel

@@ -47,4 +47,12 @@ uint64_t brickSectionHash(std::span<const BrickEntry> bricks, uint64_t BrickEntr
   return contentHash(std::as_bytes(std::span(hashes)));
 }
 
+uint64_t levelSectionHash(std::span<const LevelEntry> entries, size_t which) {
+  std::vector<uint64_t> hashes;
+  hashes.reserve(entries.size());
+  for (const LevelEntry& entry : entries)
+    hashes.push_back(entry.hash[which]);
+  return contentHash(std::as_bytes(std::span(hashes)));
+}
+
 }  // namespace freevoxel

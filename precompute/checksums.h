@@ -35,4 +35,7 @@ class ContentHash {
 /// writing nor checking a file reads brick data twice.
 uint64_t brickSectionHash(std::span<const BrickEntry> bricks, uint64_t BrickEntry::*hash);
 
+/// The same of LMAT, LATB or LATF (0, 1, 2).
+uint64_t levelSectionHash(std::span<const LevelEntry> entries, size_t which);
+
 }  // namespace freevoxel

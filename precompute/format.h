@@ -16,7 +16,7 @@
 //            16      8  bytes
 //            24      8  number of items
 //            32      8  XXH3-64 of the section's bytes; of those that hold bricks (CODE, ATTB, ATTF, ZCOD, ZFCB, ZFCF):
-//                       of their hashes in BRIK, brick by brick
+//                       of their hashes in BRIK, brick by brick; of LMAT, LATB and LATF of those in LEVL
 //             sections, none overlapping another, zeros between them; the file ends where the last one ends
 //
 //   type  items  what an item is
@@ -33,15 +33,12 @@
 //           164      4  bytes per code, b: 1 if the largest code is <= 255, else 2
 //           168      4  classification: 0 voxel, 1 preintegrated
 //           172      4  layout: 0 dense, 1 compact
-//           176      4  levels: 1, the finest only
-//           180      4  zero
-//           184      8  voxels of the volume, dims x * y * z
-//           192      8  voxels of the volume that lie in stored bricks
-//           200      8  visible voxels: opacity > 0
-//           208      8  voxels that were NaN or infinite
-//           216      8  hash of all that attenuation depends on in the transfer function (opacityHash)
-//           224      8  largest error of a value inside the range by coding it, f64
-//           232      8  zero
+//           176      4  levels, the finest included: 1, or up to as many as it takes until one brick holds the volume
+//           180      4  hierarchy: how attenuation of levels from 1 on is made, 0 geometric, 1 weighted; 0 if levels is
+//           1 184      8  voxels of the volume, dims x * y * z 192      8  voxels of the volume that lie in stored
+//           bricks 200      8  visible voxels: opacity > 0 208      8  voxels that were NaN or infinite 216      8 hash
+//           of all that attenuation depends on in the transfer function (opacityHash) 224      8  largest error of a
+//           value inside the range by coding it, f64 232      8  zero
 //   XFER  bytes  transfer function, JSON text (UTF-8)
 //   DIRS     26  direction: x y z, i8 each, pointing from the voxel outwards, in the order of direction indices
 //   BRIK  bricks stored brick, BrickEntry, ascending Hilbert index
@@ -75,6 +72,23 @@
 //   ZFCB  bricks frames of faces, directions 0..12: of ATTB the voxels from which one step leaves the brick
 //   ZFCF  bricks frames of faces, directions 13..25
 //
+// If there is more than one level, both layouts have
+//   LEVL  bricks brick of a level from 1 on, LevelEntry, ascending level, then ascending Hilbert index
+//             0      4  level
+//             4      4  zero
+//             8      8  Hilbert index of the brick among those of its level, as in BRIK
+//            16     24  offset in LMAT, in LATB and in LATF, u64 each
+//            40     12  bytes in LMAT, in LATB and in LATF, u32 each
+//            52      4  zero
+//            56     24  XXH3-64 of the brick's bytes in LMAT, in LATB and in LATF
+//   LMAT  bricks frames (brick_frames.h, of codes of 2 bytes): 4 planes of E^3 along the curve, red, green, blue
+//   (linear,
+//                65535 is 1) and extinction (IEEE binary16, log2 per shortest edge of the finest level); 0 outside
+//   LATB  bricks frames (of codes of 1 byte): 13 planes as in ATTB, of the level's voxels; 255 outside the volume
+//   LATF  bricks frames, directions 13..25
+// A voxel of level k stands for 2^k x 2^k x 2^k voxels of the finest, those of them that lie inside the volume. A brick
+// is stored if one of the eight that it stands for is; its curve is the same, one order lower.
+//
 // Bricks stand in CODE, ATTB and ATTF in the order of BRIK, so any one is found by multiplication. Frames fill ZCOD,
 // ZFCB and ZFCF without gap or overlap, in any order. Any brick is checked without reading the others: the header's
 // hash covers that of BRIK, which covers those of the bricks. A brick is stored if one of its voxels is a corner of a
@@ -101,7 +115,14 @@ enum class Classification : uint32_t { voxel = 0, preintegrated = 1 };
 /// dense: 26 bytes per stored voxel, the paper's section 5. compact: only the faces where rays enter bricks.
 enum class Layout : uint32_t { dense = 0, compact = 1 };
 
+/// How A of a voxel of a coarser level is made of those that it stands for: their geometric mean (papers/freevoxels
+/// Eq. 7), or their mean weighted by opacity (geometric where nothing is visible).
+enum class Hierarchy : uint32_t { geometric = 0, weighted = 1 };
+
 /// Names on the command line.
+constexpr std::string_view hierarchyName(Hierarchy hierarchy) {
+  return hierarchy == Hierarchy::geometric ? "geometric" : "weighted";
+}
 constexpr std::string_view classificationName(Classification classification) {
   return classification == Classification::voxel ? "voxel" : "preintegrated";
 }
@@ -150,6 +171,10 @@ inline constexpr SectionType kCommand = {'C', 'M', 'N', 'D'};
 inline constexpr SectionType kPins = {'P', 'I', 'N', 'S'};
 inline constexpr SectionType kPinFrames = {'P', 'F', 'R', 'M'};
 inline constexpr SectionType kPackedPins = {'Z', 'P', 'I', 'N'};
+inline constexpr SectionType kLevels = {'L', 'E', 'V', 'L'};
+inline constexpr SectionType kLevelMatter = {'L', 'M', 'A', 'T'};
+inline constexpr SectionType kLevelBackward = {'L', 'A', 'T', 'B'};
+inline constexpr SectionType kLevelForward = {'L', 'A', 'T', 'F'};
 }  // namespace section
 
 inline constexpr uint32_t kSectionOptional = 1;  ///< SectionEntry::flags
@@ -191,7 +216,7 @@ struct Metadata {
   Classification classification;
   Layout layout;
   uint32_t levels;
-  uint32_t zero0;
+  Hierarchy hierarchy;
   uint64_t voxels;
   uint64_t storedVoxels;
   uint64_t visibleVoxels;
@@ -206,7 +231,7 @@ static_assert(sizeof(Metadata) == 240 && offsetof(Metadata, dims) == 0 && offset
               offsetof(Metadata, codeLow) == 144 && offsetof(Metadata, codeStep) == 152 &&
               offsetof(Metadata, codeLargest) == 160 && offsetof(Metadata, codeBytes) == 164 &&
               offsetof(Metadata, classification) == 168 && offsetof(Metadata, layout) == 172 &&
-              offsetof(Metadata, levels) == 176 && offsetof(Metadata, zero0) == 180 &&
+              offsetof(Metadata, levels) == 176 && offsetof(Metadata, hierarchy) == 180 &&
               offsetof(Metadata, voxels) == 184 && offsetof(Metadata, storedVoxels) == 192 &&
               offsetof(Metadata, visibleVoxels) == 200 && offsetof(Metadata, nonFinite) == 208 &&
               offsetof(Metadata, opacityHash) == 216 && offsetof(Metadata, largestValueError) == 224 &&
@@ -231,6 +256,22 @@ struct FrameEntry {
 };
 static_assert(sizeof(FrameEntry) == 40 && offsetof(FrameEntry, offset) == 0 && offsetof(FrameEntry, bytes) == 24 &&
               offsetof(FrameEntry, zero) == 36);
+
+struct LevelEntry {
+  uint32_t level;
+  uint32_t zero0;
+  uint64_t hilbertIndex;
+  uint64_t offset[3];  ///< of matter, backward and forward attenuation, each in its section
+  uint32_t bytes[3];
+  uint32_t zero1;
+  uint64_t hash[3];
+};
+static_assert(sizeof(LevelEntry) == 80 && offsetof(LevelEntry, zero0) == 4 && offsetof(LevelEntry, hilbertIndex) == 8 &&
+              offsetof(LevelEntry, offset) == 16 && offsetof(LevelEntry, bytes) == 40 &&
+              offsetof(LevelEntry, zero1) == 52 && offsetof(LevelEntry, hash) == 56);
+
+/// Planes of a brick in LMAT: red, green, blue, extinction.
+inline constexpr int kMatterPlanes = 4;
 
 /// Brick edges that files may have: 4096-byte planes at 16; 32768 local positions, all that 16 bits hold, at 32.
 constexpr bool validBrickEdge(int64_t edge) {

@@ -22,6 +22,7 @@
 #include "precompute/brick_writer.h"
 #include "precompute/checksums.h"
 #include "precompute/code_spool.h"
+#include "precompute/level_builder.h"
 #include "precompute/stored_bricks.h"
 #include "precompute/sweep.h"
 #include "volume/code_visibility.h"
@@ -45,6 +46,23 @@ void checkOptions(const PrecomputeOptions& options, const std::string& path) {
   if (!validBrickEdge(options.brickEdge)) {
     throw InputError(fmt::format("{}: expected a brick edge of 8, 16 or 32 voxels, found {}", path, options.brickEdge));
   }
+  if (options.levels < 0)
+    throw InputError(fmt::format("{}: expected 0 or more levels, found {}", path, options.levels));
+}
+
+int levelsOf(const PrecomputeOptions& options, glm::ivec3 dims) {
+  const int most = mostHierarchyLevels(dims, options.brickEdge);
+  return options.levels == 0 ? most : std::min(options.levels, most);
+}
+
+LevelBuilder::Shape levelShape(const VolumeHeader& header, const PrecomputeOptions& options) {
+  LevelBuilder::Shape shape;
+  shape.dims = header.dims;
+  shape.edges = glm::vec3(header.placement.spacing / header.placement.unitLength());
+  shape.brickEdge = options.brickEdge;
+  shape.levels = levelsOf(options, header.dims);
+  shape.hierarchy = options.hierarchy;
+  return shape;
 }
 
 /// Where every section will lie. Hashes are filled in as the sections are written.
@@ -111,7 +129,7 @@ constexpr std::array<SectionType, 3> brickSections(Layout layout) {
 
 /// Frames are planned with the largest size they can have.
 SectionPlan planSections(const PrecomputeOptions& options, const ValueCoding& coding, uint64_t bricks,
-                         const std::string& transferText) {
+                         const std::string& transferText, int levels = 1, uint64_t levelBricks = 0) {
   const uint64_t brickVoxels = uint64_t(options.brickEdge) * uint64_t(options.brickEdge) * uint64_t(options.brickEdge);
   const uint64_t codeBytes = brickVoxels * uint64_t(coding.bytes());
   SectionPlan plan;
@@ -120,6 +138,7 @@ SectionPlan planSections(const PrecomputeOptions& options, const ValueCoding& co
   plan.add(section::kDirections, shared::kDirectionCount, 3 * shared::kDirectionCount, kSectionAlignment);
   plan.add(section::kCommand, options.command.size(), options.command.size(), kSectionAlignment, kSectionOptional);
   plan.add(section::kBricks, bricks, bricks * sizeof(BrickEntry), kSectionAlignment);
+  if (levels > 1) plan.add(section::kLevels, levelBricks, levelBricks * sizeof(LevelEntry), kSectionAlignment);
   const auto [codes, backward, forward] = brickSections(options.layout);
   if (options.layout == Layout::dense) {
     plan.add(codes, bricks, bricks * codeBytes, kPageBytes);
@@ -131,6 +150,13 @@ SectionPlan planSections(const PrecomputeOptions& options, const ValueCoding& co
     plan.add(codes, bricks, bricks * largestFrame(codeBytes), kSectionAlignment);
     plan.add(backward, bricks, bricks * faceBytes, kSectionAlignment);
     plan.add(forward, bricks, bricks * faceBytes, kSectionAlignment);
+  }
+  if (levels > 1) {
+    const uint64_t attenuationBytes = LevelBuilder::largestAttenuation(levelBricks, options.brickEdge);
+    plan.add(section::kLevelMatter, levelBricks, LevelBuilder::largestMatter(levelBricks, options.brickEdge),
+             kSectionAlignment);
+    plan.add(section::kLevelBackward, levelBricks, attenuationBytes, kSectionAlignment);
+    plan.add(section::kLevelForward, levelBricks, attenuationBytes, kSectionAlignment);
   }
   plan.place();
   return plan;
@@ -153,7 +179,8 @@ Metadata describe(const VolumeHeader& header, const TransferFunction& transfer, 
   metadata.codeBytes = uint32_t(coding.bytes());
   metadata.classification = options.classification;
   metadata.layout = options.layout;
-  metadata.levels = 1;
+  metadata.levels = uint32_t(result.levels);
+  metadata.hierarchy = result.levels > 1 ? options.hierarchy : Hierarchy::geometric;
   metadata.voxels = result.voxels;
   metadata.storedVoxels = result.storedVoxels;
   metadata.visibleVoxels = result.visibleVoxels;
@@ -178,15 +205,18 @@ using PassPlan = std::vector<unsigned>;
 
 /// Sweeps, and gives `store` all bricks. Adds its figures to `result`.
 void fillStore(BrickStore& store, const VolumeHeader& header, const TransferFunction& transfer, CodePlanes& codes,
-               const Survey& survey, const PassPlan& passPlan, const PrecomputeOptions& options, Progress& progress,
-               PrecomputeResult& result) {
+               const Survey& survey, const PassPlan& passPlan, const PrecomputeOptions& options, LevelBuilder* levels,
+               Progress& progress, PrecomputeResult& result) {
   BrickWriter writer(store, survey.bricks, header.dims, options.brickEdge,
                      [&](uint64_t voxels) { progress.advance(voxels); });
   for (int slab = 0; slab < brickDims(header.dims, options.brickEdge).z; ++slab) {
     const int first = slab * options.brickEdge;
     const int count = std::min(options.brickEdge, header.dims.z - first);
-    writer.writeCodes(slab, codes.planes(0, first, count), survey.coding);
+    const std::span<const uint16_t> ofSlab = codes.planes(0, first, count);
+    writer.writeCodes(slab, ofSlab, survey.coding);
+    if (levels != nullptr) levels->addCodes(slab, ofSlab);
   }
+  if (levels != nullptr) writer.buildLevels(*levels, codes);
   const auto segments = makeSegmentDepth(options.classification, transfer, survey.coding);
   progress.begin("attenuation", header.voxels() * shared::kDirectionCount, "voxels");
   const auto sweepStart = Clock::now();
@@ -196,25 +226,24 @@ void fillStore(BrickStore& store, const VolumeHeader& header, const TransferFunc
   progress.end();
 }
 
-/// Gives every section of frames the size it has become and moves it down to where the one before it ends.
-void closeGaps(AtomicFile& file, const CompactStore& store, SectionPlan& plan) {
-  const auto sections = brickSections(Layout::compact);
-  for (size_t which = 0; which < sections.size(); ++which) {
-    const CompactStore::Section& written = store.section(which);
-    plan[sections[which]].bytes = written.bytes;
-    plan.place();
-    const uint64_t end = plan[sections[which]].offset + written.bytes;
-    file.moveDown(written.offset, plan[sections[which]].offset, written.bytes);
-    // What lay there before must not show between the sections.
-    file.writeAt(end, std::vector<std::byte>(alignedUp(end, kSectionAlignment) - end));
-  }
-  file.truncate(plan.fileBytes());
+/// Gives a section of frames the size it has become and moves it down to where the one before it ends.
+void closeGap(AtomicFile& file, SectionType type, uint64_t writtenAt, uint64_t bytes, SectionPlan& plan) {
+  plan[type].bytes = bytes;
+  plan.place();
+  const uint64_t end = plan[type].offset + bytes;
+  file.moveDown(writtenAt, plan[type].offset, bytes);
+  // What lay there before must not show between the sections.
+  file.writeAt(end, std::vector<std::byte>(alignedUp(end, kSectionAlignment) - end));
 }
+
+constexpr std::array<SectionType, 3> kLevelSections = {section::kLevelMatter, section::kLevelBackward,
+                                                       section::kLevelForward};
 
 /// All sections but those of bricks, then the header, then the name. Adds to `result`. `frames`: of layout compact.
 void finishFile(AtomicFile& file, const VolumeHeader& header, const TransferFunction& transfer,
                 const PrecomputeOptions& options, const ValueCoding& coding, std::span<const BrickEntry> entries,
-                std::span<const FrameEntry> frames, SectionPlan& plan, PrecomputeResult& result) {
+                std::span<const FrameEntry> frames, std::span<const LevelEntry> levels, SectionPlan& plan,
+                PrecomputeResult& result) {
   const auto [codesType, backwardType, forwardType] = brickSections(options.layout);
   const std::string transferText = transferFunctionJson(transfer);
   const auto writeSection = [&](SectionType type, std::span<const std::byte> bytes) {
@@ -230,6 +259,11 @@ void finishFile(AtomicFile& file, const VolumeHeader& header, const TransferFunc
   writeSection(section::kCommand, std::as_bytes(std::span(options.command)));
   writeSection(section::kBricks, std::as_bytes(entries));
   if (options.layout == Layout::compact) writeSection(section::kFrames, std::as_bytes(frames));
+  if (result.levels > 1) {
+    writeSection(section::kLevels, std::as_bytes(levels));
+    for (size_t which = 0; which < kLevelSections.size(); ++which)
+      plan[kLevelSections[which]].hash = levelSectionHash(levels, which);
+  }
   plan[codesType].hash = brickSectionHash(entries, &BrickEntry::codesHash);
   plan[backwardType].hash = brickSectionHash(entries, &BrickEntry::backwardHash);
   plan[forwardType].hash = brickSectionHash(entries, &BrickEntry::forwardHash);
@@ -250,13 +284,16 @@ void writeFile(const VolumeHeader& header, const TransferFunction& transfer, Cod
                PrecomputeResult& result) {
   const auto start = Clock::now();
   const std::string transferText = transferFunctionJson(transfer);
-  SectionPlan plan = planSections(options, survey.coding, survey.bricks.size(), transferText);
+  const LevelBuilder::Shape shape = levelShape(header, options);
+  result.levels = shape.levels;
+  SectionPlan plan = planSections(options, survey.coding, survey.bricks.size(), transferText, shape.levels,
+                                  LevelBuilder::brickCount(survey.bricks, shape.levels));
   const auto [codesType, backwardType, forwardType] = brickSections(options.layout);
   AtomicFile file(path);
   std::unique_ptr<BrickStore> store;
   const CompactStore* compact = nullptr;
   if (options.layout == Layout::dense) {
-    file.reserve(plan.fileBytes());
+    file.reserve(plan[forwardType].offset + plan[forwardType].bytes);
     store = std::make_unique<DenseStore>(
         file, DenseStore::Offsets{plan[codesType].offset, plan[backwardType].offset, plan[forwardType].offset},
         survey.bricks, options.brickEdge, survey.coding.bytes());
@@ -267,11 +304,30 @@ void writeFile(const VolumeHeader& header, const TransferFunction& transfer, Cod
     compact = made.get();
     store = std::move(made);
   }
-  fillStore(*store, header, transfer, codes, survey, passPlan, options, progress, result);
-  if (compact != nullptr) closeGaps(file, *compact, plan);
+  std::array<uint64_t, 3> levelOffsets{};
+  std::unique_ptr<LevelBuilder> levels;
+  if (shape.levels > 1) {
+    for (size_t which = 0; which < kLevelSections.size(); ++which)
+      levelOffsets[which] = plan[kLevelSections[which]].offset;
+    levels = std::make_unique<LevelBuilder>(file, levelOffsets, shape, survey.bricks, transfer, survey.coding);
+  }
+  fillStore(*store, header, transfer, codes, survey, passPlan, options, levels.get(), progress, result);
+  if (compact != nullptr) {
+    const auto sections = brickSections(Layout::compact);
+    for (size_t which = 0; which < sections.size(); ++which)
+      closeGap(file, sections[which], compact->section(which).offset, compact->section(which).bytes, plan);
+  }
+  if (levels) {
+    for (size_t which = 0; which < kLevelSections.size(); ++which) {
+      closeGap(file, kLevelSections[which], levelOffsets[which], levels->sectionBytes(which), plan);
+      result.levelBytes += levels->sectionBytes(which);
+    }
+  }
+  file.truncate(plan.fileBytes());
 
   finishFile(file, header, transfer, options, survey.coding, store->entries(),
-             compact != nullptr ? compact->frames() : std::span<const FrameEntry>(), plan, result);
+             compact != nullptr ? compact->frames() : std::span<const FrameEntry>(),
+             levels ? levels->entries() : std::span<const LevelEntry>(), plan, result);
   result.writeSeconds = secondsSince(start) - result.sweepSeconds;
 }
 
@@ -322,15 +378,20 @@ uint64_t passBytes(const VolumeHeader& header, const PrecomputeOptions& options,
   const uint64_t frames = options.layout == Layout::compact
                               ? bricks * sizeof(FrameEntry) + slabBricks * largestFrame(passFaceBytes(edge))
                               : 0;
-  return bricks * kBytesPerBrick + frames +
+  const LevelBuilder::Shape shape = levelShape(header, options);
+  // A brick of level 1 stands for up to eight.
+  const uint64_t levels =
+      shape.levels > 1 ? LevelBuilder::memoryBytes(shape, passCount) + bricks * (sizeof(LevelEntry) + 64) : 0;
+  return bricks * kBytesPerBrick + frames + levels +
          uint64_t(passCount) * (window + slabBricks * kDirectionsPerSection * brickVoxels) +
          sweepBytes(header.dims, edge, passCount, omp_get_max_threads());
 }
 
 [[noreturn]] void failForMemory(const std::string& path, uint64_t needed, const PrecomputeOptions& options) {
   throw MachineError(fmt::format(
-      "{}: bricks of {} voxels an edge need {} bytes of memory for this volume, {} are allowed; try more{}", path,
-      options.brickEdge, needed, options.memoryBytes, options.brickEdge > 8 ? ", or smaller bricks" : ""));
+      "{}: bricks of {} voxels an edge need {} bytes of memory for this volume, {} are allowed; try more{}{}", path,
+      options.brickEdge, needed, options.memoryBytes, options.brickEdge > 8 ? ", or smaller bricks" : "",
+      options.levels != 1 ? ", or --levels 1" : ""));
 }
 
 /// Reads the volume once: its codes into `spool`, its figures into the result.
@@ -549,6 +610,9 @@ uint64_t shareBytes(const VolumeHeader& header, const PrecomputeOptions& options
 
 PrecomputeResult precomputeTogether(VolumeSource& source, const TransferFunction& transfer, const std::string& path,
                                     const PrecomputeOptions& options, SlabTeam& team, Progress& progress) {
+  if (levelsOf(options, source.header().dims) > 1) {
+    throw InputError(fmt::format("{}: levels of detail are made by one process; leave --levels out, or mpirun", path));
+  }
   const auto start = Clock::now();
   const VolumeHeader header = source.header();
   const glm::ivec3 dims = header.dims;
@@ -666,7 +730,7 @@ PrecomputeResult precomputeTogether(VolumeSource& source, const TransferFunction
   };
   collect(ownEntries, entries);
   if (compact != nullptr) collect(ownFrames, frames);
-  if (team.rank() == 0) finishFile(*file, header, transfer, options, coding, entries, frames, plan, result);
+  if (team.rank() == 0) finishFile(*file, header, transfer, options, coding, entries, frames, {}, plan, result);
   team.agree();
   result.fileBytes = plan.fileBytes();
   result.writeSeconds = secondsSince(start) - result.sweepSeconds;

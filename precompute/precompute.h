@@ -20,6 +20,10 @@ struct PrecomputeOptions {
   std::string command;  ///< recorded in the file
   /// Bytes that precomputing from a VolumeSource may take, 0: as many as there are.
   uint64_t memoryBytes = 0;
+  /// The finest included; 0, or more than there can be: until one brick holds the volume. More than one are made by one
+  /// process.
+  int levels = 1;
+  Hierarchy hierarchy = Hierarchy::geometric;  ///< of levels from 1 on
 };
 
 struct PrecomputeResult {
@@ -28,6 +32,8 @@ struct PrecomputeResult {
   uint64_t visibleVoxels = 0;  ///< with opacity > 0
   uint64_t bricks = 0;         ///< stored
   uint64_t fileBytes = 0;
+  int levels = 1;
+  uint64_t levelBytes = 0;       ///< of levels from 1 on, in the file
   uint64_t nonFinite = 0;        ///< NaN and infinities, coded as ValueCoding says
   double largestValueError = 0;  ///< largest loss by quantising values inside the range, data units
   double sweepSeconds = 0;       ///< sweeping and permuting to curve order

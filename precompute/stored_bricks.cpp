@@ -108,6 +108,14 @@ glm::ivec3 brickDims(glm::ivec3 dims, int edge) {
   return (dims + (edge - 1)) / edge;
 }
 
+glm::ivec3 dimsOfLevel(glm::ivec3 dims, int level) {
+  return (dims + ((1 << level) - 1)) >> level;
+}
+
+int mostHierarchyLevels(glm::ivec3 dims, int edge) {
+  return brickCurveOrder(dims, edge) + 1;
+}
+
 int brickCurveOrder(glm::ivec3 dims, int edge) {
   return hilbertOrder(brickDims(dims, edge));
 }

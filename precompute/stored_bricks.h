@@ -21,6 +21,12 @@ struct StoredBrick {
 /// Bricks along each axis.
 glm::ivec3 brickDims(glm::ivec3 dims, int edge);
 
+/// Voxels of a level along each axis; level 0 is the finest.
+glm::ivec3 dimsOfLevel(glm::ivec3 dims, int level);
+
+/// Levels that a volume has until one brick holds it, the finest included.
+int mostHierarchyLevels(glm::ivec3 dims, int edge);
+
 /// Order of the curve through the bricks: the smallest cube of 2^order bricks an edge that holds the volume.
 int brickCurveOrder(glm::ivec3 dims, int edge);
 

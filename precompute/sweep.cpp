@@ -227,7 +227,8 @@ class DirectionSweep {
   void endStrip() { std::swap(edges_[0], edges_[1]); }
 
   /// Four planes of the strip: their bytes go to the bricks.
-  void sweep(const Shape& shape, const TilePlace& place, const SlabBricks& bricks, Scratch& scratch) {
+  void sweep(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const SlabBricks& bricks,
+             const LevelTarget& levels, Scratch& scratch) {
     auto* const bytes = reinterpret_cast<uint8_t*>(scratch.bytes.row(0));
     const size_t planeBytes = scratch.bytes.stride() * sizeof(FixedDepth);
     const bool nothing = place.planes == 0 || place.strip * kRunEdge >= shape.dims.y;
@@ -248,8 +249,12 @@ class DirectionSweep {
         plane.beyond = edges_[0].row(neighbourPlace);
         plane.leaving = edges_[1].row(done + 1);
       }
-      tile_.planeCount = place.planes;
-      sweepTile(tile_);
+      if (levels.depths != nullptr) {
+        sweepPlanes(shape, codes, place, levels);
+      } else {
+        tile_.planeCount = place.planes;
+        sweepTile(tile_);
+      }
     }
     const int runs = shape.runsPerEdge();
     const size_t brickVoxels = size_t(shape.edge) * size_t(shape.edge) * size_t(shape.edge);
@@ -259,6 +264,31 @@ class DirectionSweep {
   }
 
  private:
+  /// One plane of the tile after the other, since level 1 needs the depths of each.
+  void sweepPlanes(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const LevelTarget& levels) {
+    const std::array<TilePlane, kRunEdge> planes = tile_.planes;
+    const bool up = sweepPass(direction_) == 0;
+    const int firstRow = place.strip * kRunEdge, slab = place.firstZ / shape.edge;
+    const auto columns = size_t(shape.dims.x + 1) / 2, rows = size_t(shape.dims.y + 1) / 2;
+    tile_.planeCount = 1;
+    for (int i = 0; i < place.planes; ++i) {
+      tile_.planes[0] = planes[size_t(i)];
+      sweepTile(tile_);
+      const int z = place.firstZ + (up ? i : -i), local = z - slab * shape.edge;
+      LevelTap::Plane plane{tile_.state, tile_.stride, nullptr, std::min(kRunEdge, shape.dims.y - firstRow),
+                            shape.dims.x};
+      if (levels.weights != nullptr)
+        plane.codes = codes.codes + linearIndex({0, firstRow, z - codes.first}, shape.dims);
+      // Planes 2 n and 2 n + 1 come one after the other, in either order.
+      const bool lower = local % 2 == 0, lone = lower && z + 1 == shape.dims.z;
+      LevelDepth* out =
+          levels.depths +
+          size_t(direction_ % kDirectionsPerSection) * LevelTarget::directionSize(shape.dims, shape.edge) +
+          (size_t(local / 2) * rows + size_t(firstRow / 2)) * columns;
+      tap_.add(plane, levels.weights, lone || lower == up, lone || lower != up, out);
+    }
+  }
+
   int direction_;
   glm::ivec3 step_;
   /// Of the plane before, or of a strip of this one if the direction stays in its plane.
@@ -267,6 +297,7 @@ class DirectionSweep {
   /// first plane of the slab, and after each.
   Rows edges_[2];
   Tile tile_;  ///< at hand
+  LevelTap tap_;
 };
 
 /// Where a direction's plane starts in BorderDepths.
@@ -283,7 +314,8 @@ struct SweepGroup {
   std::vector<DirectionSweep> sweeps;  ///< made with the first slab, by the thread that uses them
 
   void sweepSlab(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int slab,
-                 const SlabBricks& bricks, const std::vector<FixedDepth>& incoming, Scratch& scratch) {
+                 const SlabBricks& bricks, const LevelTarget& levels, const std::vector<FixedDepth>& incoming,
+                 Scratch& scratch) {
     if (sweeps.empty()) {
       for (const int direction : directions) {
         sweeps.emplace_back(direction, shape, segments.rule());
@@ -308,7 +340,7 @@ struct SweepGroup {
         for (int p = 0; p < place.planes; ++p)
           scratch.terms.fill(shape, segments, codes, done + p + 1, place.firstZ + order * p);
         for (DirectionSweep& sweep : sweeps)
-          sweep.sweep(shape, place, bricks, scratch);
+          sweep.sweep(shape, codes, place, bricks, levels, scratch);
         done += place.planes;
       }
       for (DirectionSweep& sweep : sweeps)
@@ -360,6 +392,7 @@ std::vector<SweepGroup> sweepSlabs(CodePlanes& codes, const Shape& shape, const 
     const int slabs[kSweepPasses] = {part.firstSlab + step, part.lastSlab - 1 - step};
     CodeSlab slabCodes[kSweepPasses];
     SlabBricks bricks[kSweepPasses];
+    LevelTarget levels[kSweepPasses];
     for (int pass = 0; pass < kSweepPasses; ++pass) {
       if ((passes >> pass & 1u) == 0) continue;
       const int slab = slabs[pass];
@@ -368,6 +401,7 @@ std::vector<SweepGroup> sweepSlabs(CodePlanes& codes, const Shape& shape, const 
       const int to = pass == 0 ? last : std::min(last + 1, shape.dims.z);
       slabCodes[pass] = {codes.planes(pass, from, to - from).data(), from};
       bricks[pass] = sortBricks(shape, sink.begin(pass, slab));
+      levels[pass] = sink.levels(pass, slab);
     }
     FirstException failure;
     // What a group keeps stays near the thread that has always swept it.
@@ -376,7 +410,7 @@ std::vector<SweepGroup> sweepSlabs(CodePlanes& codes, const Shape& shape, const 
       failure.guard([&] {
         SweepGroup& group = groups[i];
         group.sweepSlab(shape, segments, slabCodes[group.pass], slabs[group.pass], bricks[group.pass],
-                        part.incoming[size_t(group.pass)], scratches[size_t(omp_get_thread_num())]);
+                        levels[group.pass], part.incoming[size_t(group.pass)], scratches[size_t(omp_get_thread_num())]);
       });
     }
     failure.rethrow();

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "precompute/level_tap.h"
 #include "precompute/segment_depth.h"
 #include "shaders/shared/directions.h"
 
@@ -58,6 +59,8 @@ class AttenuationSink {
   /// The bricks of a slab that are wanted, in any order. The planes must stay where they are until complete(). Called
   /// from one thread.
   virtual std::span<const BrickPlanes> begin(int pass, int slab) = 0;
+  /// Where level 1 of the slab is to go, whatever bricks are wanted. Called from one thread, after begin().
+  virtual LevelTarget levels(int /*pass*/, int /*slab*/) { return {}; }
   /// All 13 planes of all bricks of the slab are filled. Called from one thread; ends the sweep if it throws.
   virtual void complete(int pass, int slab) = 0;
 };

@@ -10,6 +10,8 @@ layout(std430, binding = 2) readonly buffer Samples { uint samples[]; };
 layout(std430, binding = 3) readonly buffer Lights { uvec2 lights[]; };
 layout(std430, binding = 4) readonly buffer Integral { vec4 integral[]; };
 layout(std430, binding = 5) readonly buffer Density { vec4 density[]; };
+// Of blocks of levels from 1 on: colour times extinction, extinction.
+layout(std430, binding = 6) readonly buffer Matter { vec4 matter[]; };
 
 layout(location = 1) uniform int imageWidth;
 layout(location = 2) uniform float entriesPerCode;
@@ -23,31 +25,40 @@ layout(location = 1) out vec2 depthSums;
 
 const float kPerUnit = 1.0 / 65535.0;
 
-float blockPlace(int start, int voxel) {
-  precise float place = float(samples[start + voxel] & 0xffffu) * entriesPerCode;
+// Where the arrays of the block at hand start.
+struct BlockStart {
+  int samples, matter;
+};
+
+float blockPlace(BlockStart start, int voxel) {
+  precise float place = float(samples[start.samples + voxel] & 0xffffu) * entriesPerCode;
   return place;
 }
-float blockAttenuation(int start, int voxel) {
-  precise float attenuation = float(samples[start + voxel] >> 16) * kPerUnit;
+float blockAttenuation(BlockStart start, int voxel) {
+  precise float attenuation = float(samples[start.samples + voxel] >> 16) * kPerUnit;
   return attenuation;
 }
-void blockLight(int start, int voxel, out float red, out float green, out float blue) {
-  uvec2 light = lights[start + voxel];
+void blockLight(BlockStart start, int voxel, out float red, out float green, out float blue) {
+  uvec2 light = lights[start.samples + voxel];
   precise vec3 value = vec3(float(light.x & 0xffffu), float(light.x >> 16), float(light.y & 0xffffu)) * kPerUnit;
   red = value.x;
   green = value.y;
   blue = value.z;
 }
-TableValue tableIntegral(int start, int entry) {
+TableValue blockMatter(BlockStart start, int voxel) {
+  vec4 m = matter[start.matter + voxel];
+  return TableValue(m.x, m.y, m.z, m.w);
+}
+TableValue tableIntegral(BlockStart start, int entry) {
   vec4 e = integral[entry];
   return TableValue(e.x, e.y, e.z, e.w);
 }
-TableValue tableDensity(int start, int entry) {
+TableValue tableDensity(BlockStart start, int entry) {
   vec4 e = density[entry];
   return TableValue(e.x, e.y, e.z, e.w);
 }
 
-#define BLOCK_ACCESS int start_,
+#define BLOCK_ACCESS BlockStart start_,
 #define BLOCK_HAND_ON start_,
 #include "shaders/shared/cell_block.h"
 
@@ -58,7 +69,7 @@ void main() {
   depthSums = vec2(0.0);
   if (!(ray.sLow < ray.sHigh)) return;
   CellLayout layout_ = layouts[block * 3 + int(ray.axisAndSide & kRayAxisMask)];
-  RaySums sums = traceBlock(layout_.samples, ray, layout_, hiddenBelow);
+  RaySums sums = traceBlock(BlockStart(layout_.samples, layout_.matter), ray, layout_, hiddenBelow);
   precise float red = sums.red * inverseQuantum;
   precise float green = sums.green * inverseQuantum;
   precise float blue = sums.blue * inverseQuantum;

@@ -20,6 +20,13 @@ Towards Towards::direction(const Placement& placement, glm::dvec3 world) {
   return towards;
 }
 
+Towards Towards::ofLevel(int level) const {
+  Towards result = *this;
+  const double voxels = double(1 << level);
+  if (!directional) result.index = (index - 0.5 * (voxels - 1.0)) / voxels;
+  return result;
+}
+
 bool Towards::inside(glm::ivec3 dims) const {
   return !directional && glm::all(glm::greaterThan(index, glm::dvec3(-0.5))) &&
          glm::all(glm::lessThan(index, glm::dvec3(dims) - 0.5));

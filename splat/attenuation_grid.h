@@ -22,6 +22,9 @@ struct Towards {
   static Towards point(const Placement& placement, glm::dvec3 world);
   static Towards direction(const Placement& placement, glm::dvec3 world);
 
+  /// The same in the index space of a level's voxels (0: this one): voxel p of level k lies at 2^k p + (2^k - 1) / 2.
+  Towards ofLevel(int level) const;
+
   /// From a voxel to the target, in index units; not of unit length.
   glm::dvec3 from(glm::dvec3 voxel) const { return directional ? index : index - voxel; }
   /// Whether the target is a point in the box of a volume, which reaches half a voxel beyond its samples.

@@ -3,69 +3,20 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/common.hpp>
+#include <glm/glm.hpp>
 
-#include "base/error.h"
+#include "base/grid.h"
 
 namespace freevoxel {
-
-namespace {
-
-/// Calls f(voxel of the volume's arrays, voxel of the block's array) for every voxel of the block and its apron.
-template <class F>
-void forEachVoxel(glm::ivec3 dims, glm::ivec3 origin, int edge, F&& f) {
-  const int side = blockSide(edge);
-  int columns[64];
-  check(side <= 64, "a block's side fits the table of columns");
-  for (int x = 0; x < side; ++x)
-    columns[x] = std::clamp(origin.x - 1 + x, 0, dims.x - 1);
-  size_t to = 0;
-  for (int z = 0; z < side; ++z) {
-    for (int y = 0; y < side; ++y) {
-      const uint64_t row = linearIndex(
-          {0, std::clamp(origin.y - 1 + y, 0, dims.y - 1), std::clamp(origin.z - 1 + z, 0, dims.z - 1)}, dims);
-      for (int x = 0; x < side; ++x)
-        f(row + uint64_t(columns[x]), to++);
-    }
-  }
-}
-
-}  // namespace
-
-void gatherBlock(const ValueGrid& grid, const AttenuationGrid& attenuation, glm::ivec3 origin, int edge,
-                 std::span<uint16_t> codes, std::span<uint16_t> attenuations) {
-  checkEqual(codes.size(), blockVoxels(edge), "voxels of a block");
-  checkEqual(attenuations.size(), blockVoxels(edge), "voxels of a block");
-  forEachVoxel(grid.dims, origin, edge, [&](uint64_t from, size_t to) {
-    codes[to] = grid.codes[from];
-    attenuations[to] = attenuation.values[from];
-  });
-  // Beyond the volume, towards the eye, nothing is in the way.
-  const int side = blockSide(edge);
-  const auto openLayer = [&](int axis, int layer) {
-    glm::ivec3 p;
-    const int b = (axis + 1) % 3, c = (axis + 2) % 3;
-    p[axis] = layer;
-    for (p[c] = 0; p[c] < side; ++p[c]) {
-      for (p[b] = 0; p[b] < side; ++p[b])
-        attenuations[linearIndex(p, glm::ivec3(side))] = uint16_t(AttenuationGrid::kUnit);
-    }
-  };
-  for (int axis = 0; axis < 3; ++axis) {
-    if (attenuation.openLow[axis] && origin[axis] == 0) openLayer(axis, 0);
-    for (int layer = grid.dims[axis] - origin[axis] + 1; attenuation.openHigh[axis] && layer < side; ++layer)
-      openLayer(axis, layer);
-  }
-}
-
-void gatherLight(const LightGrid& light, glm::ivec3 dims, glm::ivec3 origin, int edge, std::span<LightValue> lights) {
-  checkEqual(lights.size(), blockVoxels(edge), "voxels of a block");
-  forEachVoxel(dims, origin, edge, [&](uint64_t from, size_t to) { lights[to] = light.values[from]; });
-}
 
 CellLayout cellLayout(const VisibleBlock& block, glm::ivec3 dims, int edge, int axis, bool lit) {
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;
   const int side = blockSide(edge);
   const int strides[3] = {1, side, side * side};
+  // Blocks at the border own what lies beyond it too, half a voxel of the finest level on each side.
+  constexpr float kBeyond = 1e9f;
+  const auto low = [&](int i) { return block.low[i] == 0 ? -kBeyond : float(block.low[i]); };
+  const auto high = [&](int i) { return block.high[i] >= dims[i] ? kBeyond : float(block.high[i]); };
   CellLayout layout{};
   layout.originA = block.origin[axis];
   layout.originB = block.origin[b];
@@ -73,24 +24,26 @@ CellLayout cellLayout(const VisibleBlock& block, glm::ivec3 dims, int edge, int 
   layout.strideA = strides[axis];
   layout.strideB = strides[b];
   layout.strideC = strides[c];
-  // Blocks at the border own what lies beyond it too, half a voxel on each side.
-  layout.firstA = block.low[axis] == 0 ? -1 : block.low[axis];
-  layout.endA = std::min(block.high[axis], dims[axis]);
+  layout.lowA = low(axis);
+  layout.highA = high(axis);
+  layout.lowB = low(b);
+  layout.highB = high(b);
+  layout.lowC = low(c);
+  layout.highC = high(c);
   layout.lastB = float(dims[b] - 1);
   layout.lastC = float(dims[c] - 1);
-  constexpr float kBeyond = 1e9f;
-  layout.ownLowB = block.origin[b] == 0 ? -kBeyond : float(block.origin[b]);
-  layout.ownLowC = block.origin[c] == 0 ? -kBeyond : float(block.origin[c]);
-  layout.ownHighB = block.origin[b] + edge >= dims[b] ? kBeyond : float(block.origin[b] + edge);
-  layout.ownHighC = block.origin[c] + edge >= dims[c] ? kBeyond : float(block.origin[c] + edge);
+  layout.voxels = float(1 << block.level);
+  layout.perVoxel = 1.0f / layout.voxels;
+  layout.offset = 0.5f - 0.5f * layout.perVoxel;
   layout.lit = lit ? 1 : 0;
+  layout.matter = block.level == 0 ? -1 : 0;
   return layout;
 }
 
 PixelBounds pixelBounds(const VolumeView& view, const VisibleBlock& block) {
-  // Pieces of rays that the block owns begin inside these cells and end up to a cell beside them; at the volume's
-  // border they start half a voxel further out.
-  const glm::dvec3 low = glm::dvec3(block.low) - 1.0, high = glm::dvec3(block.high) + 1.0;
+  // At the volume's border blocks reach half a voxel further out.
+  const double voxels = double(1 << block.level);
+  const glm::dvec3 low = glm::dvec3(block.low) * voxels - 0.5, high = glm::dvec3(block.high) * voxels + 0.5;
   glm::dvec2 lower(INFINITY), upper(-INFINITY);
   bool ahead = false;
   for (int corner = 0; corner < 8; ++corner) {
@@ -122,6 +75,22 @@ PixelBounds pixelBounds(const VolumeView& view, const VisibleBlock& block) {
     bounds.high[axis] = int(std::clamp(std::ceil(upper[axis] + 0.5), 0.0, size));
   }
   return bounds;
+}
+
+bool isHidden(const VisibleBlock& block, glm::ivec3 dims, int edge, const BlockSamples& samples, uint16_t threshold) {
+  const glm::ivec3 low = block.low - 1, high = block.high + 2;
+  if (glm::any(glm::lessThan(low, glm::ivec3(0))) || glm::any(glm::greaterThan(high, dims))) return false;
+  const glm::ivec3 from = low - (block.origin - 1), size = high - low;
+  for (int z = 0; z < size.z; ++z) {
+    for (int y = 0; y < size.y; ++y) {
+      const uint16_t* row =
+          samples.attenuations.data() + linearIndex(from + glm::ivec3(0, y, z), glm::ivec3(blockSide(edge)));
+      for (int x = 0; x < size.x; ++x) {
+        if (row[x] >= threshold) return false;
+      }
+    }
+  }
+  return true;
 }
 
 }  // namespace freevoxel

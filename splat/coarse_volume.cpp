@@ -5,6 +5,8 @@
 #include <glm/glm.hpp>
 #include <numbers>
 
+#include "base/error.h"
+#include "base/first_exception.h"
 #include "hierarchy/direction_lookup.h"
 #include "shaders/shared/directions.h"
 
@@ -20,16 +22,61 @@ constexpr float kDark = 0.002f;
 
 }  // namespace
 
-CoarseVolume::CoarseVolume(const ValueGrid& grid, std::span<const Classified> ofCode) : fineDims_(grid.dims) {
-  while (voxelCount((grid.dims + (factor_ - 1)) / factor_) > kMostVoxels)
+CoarseVolume::CoarseVolume(glm::ivec3 fineDims) : fineDims_(fineDims) {
+  while (voxelCount((fineDims + (factor_ - 1)) / factor_) > kMostVoxels)
     factor_ *= 2;
+  grid_.dims = (fineDims + (factor_ - 1)) / factor_;
+  extinction_.resize(voxelCount(grid_.dims));
+}
+
+CoarseVolume::CoarseVolume(const ValueGrid& grid, std::span<const Classified> ofCode) : CoarseVolume(grid.dims) {
+  grid_.coding = grid.coding;
   reduce(grid, ofCode);
-  sweepDirections();
+  finish();
+}
+
+CoarseVolume::CoarseVolume(const AttenuationFile& file, std::span<const Classified> ofCode)
+    : CoarseVolume(file.dims()) {
+  grid_.coding = file.coding();
+  // A coarse voxel is part of one brick, or bricks are parts of it, whose sums are added in their own order.
+  const int edge = file.brickEdge();
+  const int side = std::max(edge / factor_, 1), inside = std::min(edge, factor_);
+  std::vector<float> sums(file.brickCount() * size_t(side * side * side));
+  FirstException failure;
+#pragma omp parallel for schedule(dynamic, 4)
+  for (int64_t b = 0; b < int64_t(file.brickCount()); ++b) {
+    failure.guard([&] {
+      const BrickView brick = file.brick(size_t(b), DirectionSet(0));
+      const glm::ivec3 extent = glm::min(glm::ivec3(edge), file.dims() - brick.origin);
+      float* own = sums.data() + size_t(b) * size_t(side * side * side);
+      for (int z = 0; z < extent.z; ++z) {
+        for (int y = 0; y < extent.y; ++y) {
+          for (int x = 0; x < extent.x; ++x) {
+            const size_t step = brick.steps[size_t((z * edge + y) * edge + x)];
+            const uint32_t code = std::min(brick.code(step), file.coding().largest);
+            own[(z / inside * side + y / inside) * side + x / inside] += ofCode[code].extinction;
+          }
+        }
+      }
+      file.checkIntact();
+    });
+  }
+  failure.rethrow();
+  for (size_t b = 0; b < file.brickCount(); ++b) {
+    const glm::ivec3 first = file.brickOrigin(b) / factor_;
+    for (int i = 0; i < side * side * side; ++i) {
+      const glm::ivec3 p = first + glm::ivec3(i % side, i / side % side, i / (side * side));
+      if (p.x < grid_.dims.x && p.y < grid_.dims.y && p.z < grid_.dims.z)
+        extinction_[linearIndex(p, grid_.dims)] += sums[b * size_t(side * side * side) + size_t(i)];
+    }
+  }
+  // Whole cubes count, at the border too: what lies beyond it is empty. One coarse edge is `factor` fine ones.
+  for (float& sum : extinction_)
+    sum /= float(factor_ * factor_) * std::numbers::ln2_v<float>;
+  finish();
 }
 
 void CoarseVolume::reduce(const ValueGrid& grid, std::span<const Classified> ofCode) {
-  grid_.dims = (grid.dims + (factor_ - 1)) / factor_;
-  extinction_.resize(voxelCount(grid_.dims));
 #pragma omp parallel for schedule(dynamic, 1)
   for (int z = 0; z < grid_.dims.z; ++z) {
     for (int y = 0; y < grid_.dims.y; ++y) {
@@ -43,13 +90,14 @@ void CoarseVolume::reduce(const ValueGrid& grid, std::span<const Classified> ofC
               sum += ofCode[grid.codes[at]].extinction;
           }
         }
-        // Whole cubes count, at the border too: what lies beyond it is empty. One coarse edge is `factor` fine ones.
         extinction_[linearIndex({x, y, z}, grid_.dims)] = sum / (float(factor_ * factor_) * std::numbers::ln2_v<float>);
       }
     }
   }
+}
+
+void CoarseVolume::finish() {
   const float largest = std::max(*std::max_element(extinction_.begin(), extinction_.end()), 1e-6f);
-  grid_.coding = grid.coding;
   grid_.coding.largest = kLargestCode;
   grid_.codes.resize(extinction_.size());
   const glm::ivec3 cubeDims = (grid_.dims + 7) / 8;
@@ -80,6 +128,7 @@ void CoarseVolume::reduce(const ValueGrid& grid, std::span<const Classified> ofC
     table_.density[code].extinction = float(here);
     sum += here;
   }
+  sweepDirections();
 }
 
 void CoarseVolume::sweepDirections() {
@@ -111,9 +160,15 @@ void CoarseVolume::sweepDirections() {
   }
 }
 
-std::vector<float> CoarseVolume::ratios(const Towards& coarse) const {
+CoarseRatio CoarseVolume::ratio(const Towards& towards) const {
+  // The middle of coarse voxel c is fine position factor c + (factor - 1) / 2. Lengths count edges of either kind.
+  Towards coarse = towards;
+  if (!towards.directional) coarse.index = (towards.index - 0.5 * (factor_ - 1)) / double(factor_);
   const AttenuationGrid swept = sweptAttenuation(grid_, table_, cubes_, coarse);
-  std::vector<float> ratios(extinction_.size());
+  CoarseRatio result;
+  result.factor_ = factor_;
+  result.dims_ = grid_.dims;
+  result.ratios_.resize(extinction_.size());
 #pragma omp parallel for schedule(dynamic, 1)
   for (int z = 0; z < grid_.dims.z; ++z) {
     for (int y = 0; y < grid_.dims.y; ++y) {
@@ -121,7 +176,7 @@ std::vector<float> CoarseVolume::ratios(const Towards& coarse) const {
         const uint64_t at = linearIndex({x, y, z}, grid_.dims);
         const glm::dvec3 u = coarse.from({x, y, z});
         const double largest = std::max({std::abs(u.x), std::abs(u.y), std::abs(u.z)});
-        ratios[at] = 1.0f;
+        result.ratios_[at] = 1.0f;
         if (largest == 0.0) continue;
         const DirectionTriangle triangle = directionTriangle(u);
         const std::array<float, 3> weights = directionWeights(triangle, u);
@@ -130,54 +185,60 @@ std::vector<float> CoarseVolume::ratios(const Towards& coarse) const {
         for (size_t k = 0; k < 3; ++k)
           interpolated += weights[k] * std::exp2(-length * depths_[size_t(triangle.index[k])][at]);
         const float exact = float(swept.values[at]) * (1.0f / AttenuationGrid::kUnit);
-        ratios[at] = (exact + kDark) / (interpolated + kDark);
+        result.ratios_[at] = (exact + kDark) / (interpolated + kDark);
       }
     }
   }
-  return ratios;
+  return result;
 }
 
 void CoarseVolume::correct(const Towards& towards, AttenuationGrid& attenuation) const {
-  // The middle of coarse voxel c is fine position factor c + (factor - 1) / 2. Lengths count edges of either kind.
-  const double middle = 0.5 * (factor_ - 1);
-  Towards coarse = towards;
-  if (!towards.directional) coarse.index = (towards.index - middle) / double(factor_);
-  const std::vector<float> ratio = ratios(coarse);
+  const CoarseRatio ofTarget = ratio(towards);
+  const size_t planeVoxels = size_t(fineDims_.x) * size_t(fineDims_.y);
+#pragma omp parallel for schedule(dynamic, 1)
+  for (int z = 0; z < fineDims_.z; ++z) {
+    ofTarget.correct({0, 0, z}, {fineDims_.x, fineDims_.y, 1}, 0,
+                     std::span(attenuation.values).subspan(size_t(z) * planeVoxels, planeVoxels));
+  }
+}
+
+void CoarseRatio::correct(glm::ivec3 first, glm::ivec3 size, int level, std::span<uint16_t> attenuations) const {
+  checkEqual(uint64_t(attenuations.size()), voxelCount(size), "voxels of a box");
   struct Place {
     int low, high;
     float t;
   };
-  const auto place = [&](int fine, int size) {
-    const float at = std::clamp(float((fine - middle) / factor_), 0.0f, float(size - 1));
-    const int low = std::min(int(at), std::max(size - 2, 0));
-    return Place{low, std::min(low + 1, size - 1), at - float(low)};
+  const double voxels = double(1 << level);
+  const auto place = [&](int voxel, int count) {
+    const double fine = voxel * voxels + 0.5 * (voxels - 1.0);
+    const float at = std::clamp(float((fine - 0.5 * (factor_ - 1)) / factor_), 0.0f, float(count - 1));
+    const int low = std::min(int(at), std::max(count - 2, 0));
+    return Place{low, std::min(low + 1, count - 1), at - float(low)};
   };
   std::vector<Place> columns;
-  for (int x = 0; x < fineDims_.x; ++x)
-    columns.push_back(place(x, grid_.dims.x));
-#pragma omp parallel
-  {
-    std::vector<float> row(size_t(grid_.dims.x));
-#pragma omp for schedule(dynamic, 1)
-    for (int z = 0; z < fineDims_.z; ++z) {
-      const Place inZ = place(z, grid_.dims.z);
-      for (int y = 0; y < fineDims_.y; ++y) {
-        const Place inY = place(y, grid_.dims.y);
-        const float* rows[4] = {ratio.data() + linearIndex({0, inY.low, inZ.low}, grid_.dims),
-                                ratio.data() + linearIndex({0, inY.high, inZ.low}, grid_.dims),
-                                ratio.data() + linearIndex({0, inY.low, inZ.high}, grid_.dims),
-                                ratio.data() + linearIndex({0, inY.high, inZ.high}, grid_.dims)};
-        for (size_t x = 0; x < row.size(); ++x) {
-          const float low = rows[0][x] + inY.t * (rows[1][x] - rows[0][x]);
-          const float high = rows[2][x] + inY.t * (rows[3][x] - rows[2][x]);
-          row[x] = low + inZ.t * (high - low);
-        }
-        uint16_t* values = attenuation.values.data() + linearIndex({0, y, z}, fineDims_);
-        for (int x = 0; x < fineDims_.x; ++x) {
-          const Place& inX = columns[size_t(x)];
-          const float factor = row[size_t(inX.low)] + inX.t * (row[size_t(inX.high)] - row[size_t(inX.low)]);
-          values[x] = uint16_t(std::min(float(values[x]) * factor + 0.5f, AttenuationGrid::kUnit));
-        }
+  for (int x = 0; x < size.x; ++x)
+    columns.push_back(place(first.x + x, dims_.x));
+  const int firstColumn = columns.front().low, lastColumn = columns.back().high;
+  std::vector<float> row(size_t(lastColumn - firstColumn + 1));
+  uint16_t* values = attenuations.data();
+  for (int z = 0; z < size.z; ++z) {
+    const Place inZ = place(first.z + z, dims_.z);
+    for (int y = 0; y < size.y; ++y, values += size.x) {
+      const Place inY = place(first.y + y, dims_.y);
+      const float* rows[4] = {ratios_.data() + linearIndex({firstColumn, inY.low, inZ.low}, dims_),
+                              ratios_.data() + linearIndex({firstColumn, inY.high, inZ.low}, dims_),
+                              ratios_.data() + linearIndex({firstColumn, inY.low, inZ.high}, dims_),
+                              ratios_.data() + linearIndex({firstColumn, inY.high, inZ.high}, dims_)};
+      for (size_t x = 0; x < row.size(); ++x) {
+        const float low = rows[0][x] + inY.t * (rows[1][x] - rows[0][x]);
+        const float high = rows[2][x] + inY.t * (rows[3][x] - rows[2][x]);
+        row[x] = low + inZ.t * (high - low);
+      }
+      for (int x = 0; x < size.x; ++x) {
+        const Place& inX = columns[size_t(x)];
+        const float low = row[size_t(inX.low - firstColumn)], high = row[size_t(inX.high - firstColumn)];
+        const float factor = low + inX.t * (high - low);
+        values[x] = uint16_t(std::min(float(values[x]) * factor + 0.5f, AttenuationGrid::kUnit));
       }
     }
   }

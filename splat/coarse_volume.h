@@ -9,23 +9,44 @@
 #include <span>
 #include <vector>
 
+#include "hierarchy/attenuation_file.h"
 #include "splat/attenuation_grid.h"
 
 namespace freevoxel {
+
+/// How wrong stored attenuation towards one target is, all over the volume.
+class CoarseRatio {
+ public:
+  /// Multiplies the attenuation of a box of voxels of a level, x fastest, by the ratio there. `first`: its first voxel.
+  void correct(glm::ivec3 first, glm::ivec3 size, int level, std::span<uint16_t> attenuations) const;
+  uint64_t bytes() const { return ratios_.size() * sizeof(float); }
+
+ private:
+  friend class CoarseVolume;
+  int factor_ = 1;  ///< finest voxels along the edge of one of its own
+  glm::ivec3 dims_{0};
+  std::vector<float> ratios_;
+};
 
 class CoarseVolume {
  public:
   /// `ofCode[code]` for every code of the grid.
   CoarseVolume(const ValueGrid& grid, std::span<const Classified> ofCode);
+  /// The same from a file, which reads all of its codes. Throws InputError if it is damaged.
+  CoarseVolume(const AttenuationFile& file, std::span<const Classified> ofCode);
 
+  CoarseRatio ratio(const Towards& towards) const;
   /// Multiplies stored attenuation towards a target by the ratio.
   void correct(const Towards& towards, AttenuationGrid& attenuation) const;
+  /// What it takes in memory, about.
+  uint64_t bytes() const { return extinction_.size() * (sizeof(float) * (1 + depths_.size()) + 2 * sizeof(uint16_t)); }
 
  private:
+  explicit CoarseVolume(glm::ivec3 fineDims);
+  /// From extinction_, in place until then: codes, table, visible cubes, and the directions.
+  void finish();
   void reduce(const ValueGrid& grid, std::span<const Classified> ofCode);
   void sweepDirections();
-  /// The ratio at every coarse voxel.
-  std::vector<float> ratios(const Towards& coarse) const;
 
   int factor_ = 2;  ///< fine voxels along the edge of a coarse one
   glm::ivec3 fineDims_{0};

@@ -4,6 +4,7 @@
 
 #include "shaders/shared/quantum.h"
 #include "splat/draw_cells.h"
+#include "splat/ready_blocks.h"
 
 namespace freevoxel::shared {
 
@@ -12,6 +13,7 @@ struct BlockReader {
   const float* places;
   const float* attenuations;
   const LightValue* lights;
+  const TableEntry* matter;
   const TableEntry* integral;
   const TableEntry* density;
 };
@@ -27,6 +29,10 @@ inline void blockLight(const BlockReader& block, int voxel, float& red, float& g
   red = float(light.red) * (1.0f / LightGrid::kUnit);
   green = float(light.green) * (1.0f / LightGrid::kUnit);
   blue = float(light.blue) * (1.0f / LightGrid::kUnit);
+}
+inline TableValue blockMatter(const BlockReader& block, int voxel) {
+  const TableEntry& m = block.matter[voxel];
+  return {m.red, m.green, m.blue, m.extinction};
 }
 inline TableValue tableIntegral(const BlockReader& block, int entry) {
   const TableEntry& e = block.integral[entry];
@@ -47,20 +53,22 @@ namespace freevoxel {
 
 namespace {
 
-constexpr int kTile = 32;              // pixels an edge
-constexpr size_t kBlocksAtATime = 64;  // their samples fit the last-level cache
+constexpr int kTile = 32;  // pixels an edge
 
 class CpuCellCanvas final : public CellCanvas {
  public:
-  explicit CpuCellCanvas(glm::ivec2 imageSize) : size_(imageSize) {}
+  CpuCellCanvas(glm::ivec2 imageSize, size_t blocksAtATime) : size_(imageSize), blocksAtATime_(blocksAtATime) {}
 
   void clear() override { image_ = Image(size_, kSumChannels); }
 
   void draw(const CellFrame& frame, std::span<const VisibleBlock> blocks, CellCounts& counts) override {
-    while (!blocks.empty()) {
-      const std::span<const VisibleBlock> batch = blocks.first(std::min(blocks.size(), kBlocksAtATime));
-      blocks = blocks.subspan(batch.size());
-      drawBatch(frame, batch, counts);
+    const std::vector<VisibleBlock> shown = blocksOnImage(frame, blocks, counts);
+    frame.advanced(blocks.size() - shown.size());
+    for (size_t first = 0; first < shown.size(); first += blocksAtATime_) {
+      const auto batch = std::span(shown).subspan(first, std::min(blocksAtATime_, shown.size() - first));
+      readyBlocks(frame, batch, ready_, counts);
+      drawBatch(frame, counts);
+      frame.advanced(batch.size());
     }
   }
 
@@ -68,46 +76,32 @@ class CpuCellCanvas final : public CellCanvas {
 
  private:
   struct Prepared {
-    PixelBounds bounds;
     CellLayout layouts[3];  ///< by dominant axis
     std::vector<float> places, attenuations;
-    std::vector<LightValue> lights;
     shared::BlockReader reader;
   };
 
-  void prepare(const CellFrame& frame, const VisibleBlock& block, Prepared& prepared) {
-    prepared.bounds = pixelBounds(*frame.view, block);
-    if (prepared.bounds.empty()) return;
-    const bool lit = !frame.light->empty();
-    const glm::ivec3 dims = frame.grid->dims;
+  static void prepare(const CellFrame& frame, const ReadyBlock& ready, Prepared& prepared) {
+    const bool lit = frame.source->lit();
+    const glm::ivec3 dims = frame.source->dims(ready.block.level);
     for (int axis = 0; axis < 3; ++axis)
-      prepared.layouts[axis] = cellLayout(block, dims, frame.edge, axis, lit);
-    const size_t voxels = blockVoxels(frame.edge);
-    std::vector<uint16_t> codes(voxels), attenuations(voxels);
-    gatherBlock(*frame.grid, *frame.attenuation, block.origin, frame.edge, codes, attenuations);
-    prepared.places.resize(voxels);
-    prepared.attenuations.resize(voxels);
-    for (size_t i = 0; i < voxels; ++i) {
-      prepared.places[i] = float(codes[i]) * frame.table->entriesPerCode;
-      prepared.attenuations[i] = float(attenuations[i]) * (1.0f / AttenuationGrid::kUnit);
-    }
-    if (lit) {
-      prepared.lights.resize(voxels);
-      gatherLight(*frame.light, dims, block.origin, frame.edge, prepared.lights);
-    }
-    prepared.reader = {prepared.places.data(), prepared.attenuations.data(), prepared.lights.data(),
-                       frame.table->integral.data(), frame.table->density.data()};
+      prepared.layouts[axis] = cellLayout(ready.block, dims, frame.source->edge(), axis, lit);
+    const BlockSamples& samples = ready.samples;
+    prepared.places.resize(samples.codes.size());
+    for (size_t i = 0; i < samples.codes.size(); ++i)
+      prepared.places[i] = float(samples.codes[i]) * frame.table->entriesPerCode;
+    prepared.attenuations.resize(samples.attenuations.size());
+    for (size_t i = 0; i < samples.attenuations.size(); ++i)
+      prepared.attenuations[i] = float(samples.attenuations[i]) * (1.0f / AttenuationGrid::kUnit);
+    prepared.reader = {prepared.places.data(), prepared.attenuations.data(), samples.lights.data(),
+                       samples.matter.data(),  frame.table->integral.data(), frame.table->density.data()};
   }
 
-  void drawBatch(const CellFrame& frame, std::span<const VisibleBlock> blocks, CellCounts& counts) {
-    prepared_.resize(blocks.size());
+  void drawBatch(const CellFrame& frame, CellCounts& counts) {
+    prepared_.resize(ready_.size());
 #pragma omp parallel for schedule(dynamic, 1)
-    for (int64_t i = 0; i < int64_t(blocks.size()); ++i)
-      prepare(frame, blocks[size_t(i)], prepared_[size_t(i)]);
-    for (const Prepared& prepared : prepared_) {
-      (prepared.bounds.empty() ? counts.culledBlocks : counts.blocks) += 1;
-      const glm::ivec2 size = prepared.bounds.high - prepared.bounds.low;
-      if (!prepared.bounds.empty()) counts.fragments += uint64_t(size.x) * uint64_t(size.y);
+    for (int64_t i = 0; i < int64_t(ready_.size()); ++i) {
+      if (ready_[size_t(i)].drawn) prepare(frame, ready_[size_t(i)], prepared_[size_t(i)]);
     }
     const glm::ivec2 tiles = (image_.size + (kTile - 1)) / kTile;
     uint64_t pieces = 0;
@@ -115,12 +109,12 @@ class CpuCellCanvas final : public CellCanvas {
     for (int tile = 0; tile < tiles.x * tiles.y; ++tile) {
       const glm::ivec2 low = glm::ivec2(tile % tiles.x, tile / tiles.x) * kTile;
       const glm::ivec2 high = glm::min(low + kTile, image_.size);
-      for (const Prepared& prepared : prepared_) {
-        if (prepared.bounds.empty()) continue;
-        const glm::ivec2 from = glm::max(low, prepared.bounds.low), to = glm::min(high, prepared.bounds.high);
+      for (size_t i = 0; i < ready_.size(); ++i) {
+        if (!ready_[i].drawn) continue;
+        const glm::ivec2 from = glm::max(low, ready_[i].bounds.low), to = glm::min(high, ready_[i].bounds.high);
         for (int y = from.y; y < to.y; ++y) {
           for (int x = from.x; x < to.x; ++x)
-            pieces += drawPixel(frame, prepared, x, y);
+            pieces += drawPixel(frame, prepared_[i], x, y);
         }
       }
     }
@@ -147,13 +141,20 @@ class CpuCellCanvas final : public CellCanvas {
 
   glm::ivec2 size_;
   Image image_;
+  size_t blocksAtATime_;
+  std::vector<ReadyBlock> ready_;
   std::vector<Prepared> prepared_;
 };
 
 }  // namespace
 
-std::unique_ptr<CellCanvas> makeCpuCellCanvas(glm::ivec2 imageSize) {
-  return std::make_unique<CpuCellCanvas>(imageSize);
+std::unique_ptr<CellCanvas> makeCpuCellCanvas(glm::ivec2 imageSize, size_t blocksAtATime) {
+  return std::make_unique<CpuCellCanvas>(imageSize, blocksAtATime);
+}
+
+uint64_t cpuCanvasBytes(int edge) {
+  // Codes and attenuation, also as floats; matter; light.
+  return blockVoxels(edge) * (2 * sizeof(uint16_t) + 2 * sizeof(float) + sizeof(TableEntry) + sizeof(LightValue));
 }
 
 }  // namespace freevoxel

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <numbers>
 #include <utility>
+
+#include "base/grid.h"
+#include "splat/attenuation_grid.h"
 
 namespace freevoxel {
 
@@ -54,18 +58,28 @@ float KernelSetup::lengthPerPlane(glm::dvec3 towards) const {
   return float(1.0 / std::max({omega.x, omega.y, omega.z}));
 }
 
+Classified KernelSetup::classify(const BlockSamples& samples, size_t at) const {
+  if (samples.matter.empty()) return classified_[samples.codes[at]];
+  const TableEntry& matter = samples.matter[at];
+  Classified voxel{};
+  if (!(matter.extinction > 0.0f)) return voxel;
+  voxel.linear = glm::vec3(matter.red, matter.green, matter.blue) / matter.extinction;
+  voxel.extinction = matter.extinction * std::numbers::ln2_v<float>;
+  return voxel;
+}
+
 template <class Keep>
-void KernelSetup::forEachSplat(const ValueGrid& grid, const AttenuationGrid* attenuation, const LightGrid& light,
-                               glm::ivec3 origin, int edge, Counts& counts, Keep&& keep) const {
-  const glm::ivec3 last = glm::min(origin + edge, grid.dims);
-  for (int z = origin.z; z < last.z; ++z) {
-    for (int y = origin.y; y < last.y; ++y) {
-      uint64_t at = linearIndex({origin.x, y, z}, grid.dims);
-      for (int x = origin.x; x < last.x; ++x, ++at) {
-        const Classified& voxel = classified_[grid.codes[at]];
+void KernelSetup::forEachSplat(const BlockSamples& samples, const VisibleBlock& block, glm::ivec3 dims, int edge,
+                               Counts& counts, Keep&& keep) const {
+  const glm::ivec3 last = glm::min(block.origin + edge, dims);
+  for (int z = block.origin.z; z < last.z; ++z) {
+    for (int y = block.origin.y; y < last.y; ++y) {
+      const glm::ivec3 first(block.origin.x, y, z);
+      uint64_t at = linearIndex(first - block.origin + 1, glm::ivec3(blockSide(edge)));
+      for (int x = block.origin.x; x < last.x; ++x, ++at) {
+        const Classified voxel = classify(samples, at);
         if (voxel.extinction <= 0.0f) continue;
-        const float reaching =
-            attenuation == nullptr ? 1.0f : float(attenuation->values[at]) * (1.0f / AttenuationGrid::kUnit);
+        const float reaching = float(samples.attenuations[at]) * (1.0f / AttenuationGrid::kUnit);
         if (reaching < hiddenBelow_) {
           ++counts.hiddenSplats;
           continue;
@@ -75,10 +89,10 @@ void KernelSetup::forEachSplat(const ValueGrid& grid, const AttenuationGrid* att
           ++counts.culledSplats;
           continue;
         }
-        if (!light.empty()) {
-          splat.emissionR *= float(light.values[at].red) * (1.0f / LightGrid::kUnit);
-          splat.emissionG *= float(light.values[at].green) * (1.0f / LightGrid::kUnit);
-          splat.emissionB *= float(light.values[at].blue) * (1.0f / LightGrid::kUnit);
+        if (!samples.lights.empty()) {
+          splat.emissionR *= float(samples.lights[at].red) * (1.0f / LightGrid::kUnit);
+          splat.emissionG *= float(samples.lights[at].green) * (1.0f / LightGrid::kUnit);
+          splat.emissionB *= float(samples.lights[at].blue) * (1.0f / LightGrid::kUnit);
         }
         keep(splat, glm::ivec3(x, y, z));
       }
@@ -86,15 +100,15 @@ void KernelSetup::forEachSplat(const ValueGrid& grid, const AttenuationGrid* att
   }
 }
 
-void KernelSetup::append(const ValueGrid& grid, const AttenuationGrid& attenuation, const LightGrid& light,
-                         glm::ivec3 origin, int edge, std::vector<KernelSplat>& splats, Counts& counts) const {
-  forEachSplat(grid, &attenuation, light, origin, edge, counts,
+void KernelSetup::append(const BlockSamples& samples, const VisibleBlock& block, glm::ivec3 dims, int edge,
+                         std::vector<KernelSplat>& splats, Counts& counts) const {
+  forEachSplat(samples, block, dims, edge, counts,
                [&](const KernelSplat& splat, glm::ivec3) { splats.push_back(splat); });
 }
 
-void KernelSetup::appendWithDistance(const ValueGrid& grid, const LightGrid& light, glm::ivec3 origin, int edge,
+void KernelSetup::appendWithDistance(const BlockSamples& samples, const VisibleBlock& block, glm::ivec3 dims, int edge,
                                      std::vector<BlendSplat>& splats, Counts& counts) const {
-  forEachSplat(grid, nullptr, light, origin, edge, counts, [&](const KernelSplat& splat, glm::ivec3 voxel) {
+  forEachSplat(samples, block, dims, edge, counts, [&](const KernelSplat& splat, glm::ivec3 voxel) {
     const glm::dvec3 position = view_.viewPosition(glm::dvec3(voxel));
     splats.push_back({splat, float(view_.orthographic ? -position.z : glm::length(position))});
   });

@@ -4,10 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "hierarchy/value_grid.h"
 #include "shaders/shared/kernel_splat.h"
-#include "splat/attenuation_grid.h"
-#include "splat/light_grid.h"
+#include "splat/block_source.h"
 #include "splat/volume_view.h"
 #include "volume/transfer_function.h"
 
@@ -44,12 +42,11 @@ class KernelSetup {
     uint64_t fragments = 0;
   };
 
-  /// Appends the splats of the visible voxels of a block of edge^3 voxels that touch the image, x fastest.
-  void append(const ValueGrid& grid, const AttenuationGrid& attenuation, const LightGrid& light, glm::ivec3 origin,
-              int edge, std::vector<KernelSplat>& splats, Counts& counts) const;
-
-  /// The same with nothing in the way of any voxel.
-  void appendWithDistance(const ValueGrid& grid, const LightGrid& light, glm::ivec3 origin, int edge,
+  /// Appends the splats of the visible voxels of a block of edge^3 voxels that touch the image, x fastest. `dims`: of
+  /// the block's level, which is that of the view.
+  void append(const BlockSamples& samples, const VisibleBlock& block, glm::ivec3 dims, int edge,
+              std::vector<KernelSplat>& splats, Counts& counts) const;
+  void appendWithDistance(const BlockSamples& samples, const VisibleBlock& block, glm::ivec3 dims, int edge,
                           std::vector<BlendSplat>& splats, Counts& counts) const;
 
   /// Whether a splat of this block could touch the image. Never false for one that would.
@@ -58,10 +55,11 @@ class KernelSetup {
  private:
   /// Way through the volume per plane of voxels towards a direction of view space.
   float lengthPerPlane(glm::dvec3 towards) const;
-  /// Calls keep(splat, index) for the block's visible voxels; `attenuation` may be null.
+  /// Calls keep(splat, index) for the block's visible voxels.
   template <class Keep>
-  void forEachSplat(const ValueGrid& grid, const AttenuationGrid* attenuation, const LightGrid& light,
-                    glm::ivec3 origin, int edge, Counts& counts, Keep&& keep) const;
+  void forEachSplat(const BlockSamples& samples, const VisibleBlock& block, glm::ivec3 dims, int edge, Counts& counts,
+                    Keep&& keep) const;
+  Classified classify(const BlockSamples& samples, size_t at) const;
   bool makeSplat(glm::ivec3 index, const Classified& voxel, float attenuation, KernelSplat& splat,
                  Counts& counts) const;
 

@@ -11,18 +11,13 @@
 #include "hierarchy/value_grid.h"
 #include "splat/attenuation_grid.h"
 #include "splat/stored_attenuation.h"
+#include "splat/voxel_lighting.h"
 
 namespace freevoxel {
 
-/// Linear RGB, 65535 standing for the grid's scale.
-struct LightValue {
-  uint16_t red, green, blue, unused;
-};
-static_assert(sizeof(LightValue) == 8);
-
 /// x fastest. Empty: every voxel shines with its own colour, unlit.
 struct LightGrid {
-  static constexpr float kUnit = 65535.0f;
+  static constexpr float kUnit = VoxelLighting::kUnit;
   std::vector<LightValue> values;
   float scale = 1.0f;  ///< the largest channel that light can reach: radiance is the sum times this
 

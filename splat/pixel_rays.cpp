@@ -26,11 +26,19 @@ PixelRay indexRay(glm::dvec3 origin, glm::dvec3 direction, glm::ivec3 dims) {
     enter = std::max(enter, std::min(t0, t1));
     leave = std::min(leave, std::max(t0, t1));
   }
-  const double slopeB = direction[b] / direction[a], slopeC = direction[c] / direction[a];
+  // Less than this moves a ray by nothing along the largest volume there can be.
+  constexpr double kLeastSlope = 1e-20;
+  const auto slopeOf = [&](int axis) {
+    const double slope = direction[axis] / direction[a];
+    return std::abs(slope) < kLeastSlope ? 0.0 : slope;
+  };
+  const double slopeB = slopeOf(b), slopeC = slopeOf(c);
   ray.baseB = float(origin[b] - origin[a] * slopeB);
   ray.baseC = float(origin[c] - origin[a] * slopeC);
   ray.slopeB = float(slopeB);
   ray.slopeC = float(slopeC);
+  ray.perSlopeB = slopeB == 0.0 ? 0.0f : float(1.0 / slopeB);
+  ray.perSlopeC = slopeC == 0.0 ? 0.0f : float(1.0 / slopeC);
   // The ray's parameter counts shortest voxel edges.
   ray.lengthPerPlane = float(1.0 / std::abs(direction[a]));
   ray.axisAndSide = uint32_t(a) | (direction[a] < 0.0 ? shared::kRayEyeAbove : 0u);

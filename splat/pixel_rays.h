@@ -12,7 +12,7 @@
 namespace freevoxel {
 
 using shared::PixelRay;
-static_assert(sizeof(PixelRay) == 32 && offsetof(PixelRay, sLow) == 16 && offsetof(PixelRay, axisAndSide) == 28,
+static_assert(sizeof(PixelRay) == 40 && offsetof(PixelRay, sLow) == 24 && offsetof(PixelRay, axisAndSide) == 36,
               "the shaders read rays at these offsets");
 
 /// One ray per pixel, row 0 first. Rays that miss the volume's box are empty.

@@ -2,21 +2,22 @@
 
 #include <algorithm>
 #include <chrono>
-#include <glm/common.hpp>
-#include <glm/matrix.hpp>
-#include <numeric>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include "base/error.h"
+#include "base/grid.h"
 #include "shaders/shared/quantum.h"
 #include "splat/attenuation_grid.h"
 #include "splat/blend_kernels.h"
 #include "splat/coarse_volume.h"
 #include "splat/draw_cells.h"
-#include "splat/draw_kernels.h"
+#include "splat/draw_frame.h"
+#include "splat/file_block_source.h"
+#include "splat/grid_block_source.h"
 #include "splat/kernel_splats.h"
+#include "splat/level_selection.h"
 #include "splat/near_field.h"
 #include "splat/pinned_attenuation.h"
 #include "splat/pixel_rays.h"
@@ -31,35 +32,6 @@ double secondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// Kernel splats held at a time: 48 bytes each.
-constexpr size_t kSplatsPerBatch = size_t(1) << 20;
-constexpr size_t kBlocksPerBatch = 64;
-
-/// A small generator of our own: the standard's shuffle differs between libraries.
-class SplitMix {
- public:
-  explicit SplitMix(uint64_t seed) : state_(seed) {}
-  uint64_t next() {
-    uint64_t z = (state_ += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
-
- private:
-  uint64_t state_;
-};
-
-template <class T>
-void putInOrder(std::vector<T>& items, const SplatOrder& order, uint64_t salt) {
-  if (order.kind == SplatOrder::Kind::reverse) std::reverse(items.begin(), items.end());
-  if (order.kind == SplatOrder::Kind::shuffle) {
-    SplitMix random(order.seed * 0x2545f4914f6cdd1du + salt);
-    for (size_t i = items.size(); i > 1; --i)
-      std::swap(items[i - 1], items[size_t(random.next() % i)]);
-  }
-}
-
 std::vector<Classified> classifyCodes(const ValueCoding& coding, const TransferFunction& transfer) {
   std::vector<Classified> classified(size_t(coding.largest) + 1);
   for (size_t code = 0; code < classified.size(); ++code)
@@ -67,42 +39,17 @@ std::vector<Classified> classifyCodes(const ValueCoding& coding, const TransferF
   return classified;
 }
 
-/// What less of its light than this would reach the eye from is hidden.
-constexpr float kHiddenBelow = 0x1p-12f;
-
-/// Whether no voxel that the block's rays may touch has attenuation of `threshold` (of AttenuationGrid::kUnit) or more.
-/// Never at the volume's border, where a ray sees what it enters first, whatever the voxels around say.
-bool isHidden(const VisibleBlock& block, glm::ivec3 dims, const AttenuationGrid& attenuation, uint16_t threshold) {
-  const glm::ivec3 low = block.low - 1, high = block.high + 2;
-  if (glm::any(glm::lessThan(low, glm::ivec3(0))) || glm::any(glm::greaterThan(high, dims))) return false;
-  for (int z = low.z; z < high.z; ++z) {
-    for (int y = low.y; y < high.y; ++y) {
-      const uint16_t* row = attenuation.values.data() + linearIndex({low.x, y, z}, dims);
-      for (int x = 0; x < high.x - low.x; ++x) {
-        if (row[x] >= threshold) return false;
-      }
-    }
-  }
-  return true;
+Towards towardsEye(const Placement& placement, const Camera& camera) {
+  return camera.orthographicHeight ? Towards::direction(placement, camera.eye - camera.target)
+                                   : Towards::point(placement, camera.eye);
 }
 
-/// Tiles of rays (kRayTile) in which one of the blocks may be seen.
-std::vector<uint8_t> coveredTiles(const VolumeView& view, std::span<const VisibleBlock> blocks) {
-  const glm::ivec2 count = (view.imageSize + (kRayTile - 1)) / kRayTile;
-  std::vector<uint8_t> covered(size_t(count.x) * size_t(count.y));
-  for (const VisibleBlock& block : blocks) {
-    const PixelBounds bounds = pixelBounds(view, block);
-    if (bounds.empty()) continue;
-    const glm::ivec2 first = bounds.low / kRayTile, last = (bounds.high - 1) / kRayTile;
-    for (int y = first.y; y <= last.y; ++y)
-      std::fill_n(covered.begin() + int64_t(y) * count.x + first.x, last.x - first.x + 1, uint8_t(1));
-  }
-  return covered;
+Towards towardsLamp(const Placement& placement, const Light& lamp) {
+  return lamp.directional ? Towards::direction(placement, lamp.world) : Towards::point(placement, lamp.world);
 }
 
-Towards towardsEye(const ValueGrid& grid, const Camera& camera) {
-  return camera.orthographicHeight ? Towards::direction(grid.placement, camera.eye - camera.target)
-                                   : Towards::point(grid.placement, camera.eye);
+StoredLookup lookupOf(AttenuationSource source) {
+  return source == AttenuationSource::quotient ? StoredLookup::quotient : StoredLookup::interpolated;
 }
 
 }  // namespace
@@ -126,77 +73,136 @@ std::string_view attenuationSourceName(AttenuationSource source) {
 }
 
 struct Splatter::State {
-  const ValueGrid& grid;
-  const AttenuationFile* file;
+  const AttenuationFile* file = nullptr;  ///< may be null
+  const ValueGrid* given = nullptr;       ///< may be null if there is a file
   TransferFunction transfer;
+  int blockEdge = kBlockEdge;
+  glm::ivec3 dims{0};
+  Placement placement;
+  ValueCoding coding;
   std::vector<Classified> classified;
   ClassificationTable table;
-  std::vector<VisibleBlock> blocks;
-  VisibleCubes cubes;
-  std::unique_ptr<gl::Context> context;  // null: cpu
-  LightGrid light;
-  std::optional<CoarseVolume> coarse;  ///< made when first needed
-  int blockEdge;
+  std::optional<CodeVisibility> visibility;
+  std::unique_ptr<gl::Context> context;  ///< null: cpu
+  // Made when first needed.
+  std::optional<ValueGrid> own;
+  std::optional<VisibleCubes> cubes;
+  std::optional<CoarseVolume> coarse;
+  std::vector<uint16_t> absent;                   ///< codes of bricks that the file lacks
+  std::vector<std::vector<VisibleBlock>> levels;  ///< blocks of each level; at first of the finest only
 
-  /// What of a frame does not depend on the quantum, light apart.
+  /// What of a frame does not depend on the quantum.
   struct Frame {
     Camera camera;
     SplatOptions options;
     VolumeView view;
+    std::vector<VisibleBlock> blocks;
+    size_t blocksAtATime = 64;
+    // What the source looks at.
     AttenuationGrid attenuation;
+    LightGrid light;
+    std::optional<VoxelLighting> lighting;
+    std::vector<LampAttenuation> swept;  ///< per lamp; unused where stored
+    std::vector<std::unique_ptr<CoarseRatio>> ratios;
+    std::unique_ptr<BlockSource> source;
+    float lightScale = 1.0f;
+    std::vector<PixelRay> rays;  ///< where blocks were drawn
     SplatStatistics statistics;
   };
-  std::optional<Frame> frame;
-  std::vector<PixelRay> rays;  ///< of the frame, where blocks were drawn
+  std::unique_ptr<Frame> frame;
 
+  void open(Backend backend);
+  const ValueGrid& grid();
+  const VisibleCubes& visibleCubes();
+  const CoarseVolume& coarseVolume();
+  void findLevels();
   /// The source that `automatic` stands for. Throws InputError if there is no file to take it from.
   AttenuationSource chosen(AttenuationSource source, const Towards& target, bool lamp) const;
   /// What kernels draw leaves out a voxel's own matter, so there the near field is not traced.
   AttenuationGrid attenuationTowards(const Towards& target, AttenuationSource source, Footprint footprint);
-  void lightVoxels(const Camera& camera, const SplatOptions& options, SplatStatistics& statistics);
-  /// Visible blocks, without hidden ones if asked for, in the order asked for.
-  std::vector<VisibleBlock> blocksToDraw(const AttenuationGrid& attenuation, const SplatOptions& options,
-                                         std::span<const uint8_t> share, SplatStatistics& statistics) const;
-  /// Draws the share's blocks once and gives the sums in whole quanta.
-  Image drawCells(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
-                  const SplatOptions& options, float quantum, std::span<const uint8_t> share,
-                  SplatStatistics& statistics, Progress& progress);
-  Image drawKernels(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
-                    const SplatOptions& options, float quantum, std::span<const uint8_t> share,
-                    SplatStatistics& statistics, Progress& progress);
+  StoredTarget storedTarget(Frame& to, const Towards& target, AttenuationSource source, bool nearest);
+  void lookIntoGrids(Frame& to, const Towards& eye, AttenuationSource source);
+  void lookIntoFile(Frame& to, const Towards& eye, AttenuationSource source);
+  /// Throws MachineError if that is too little.
+  void shareMemory(Frame& to, uint64_t fixedBytes, uint64_t bytesPerBlock, uint64_t& sourceBytes) const;
+  LightGrid lightVoxels(const Camera& camera, const SplatOptions& options, SplatStatistics& statistics);
 };
 
 Splatter::Splatter(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer,
                    Backend backend, int blockEdge)
-    : state_(std::make_unique<State>(State{grid, file, transfer, {}, {}, {}, {}, nullptr, {}, {}, blockEdge, {}, {}})) {
-  check(blockEdge >= 1 && blockEdge <= 61, "a block's edge is 1 to 61 voxels");
+    : state_(std::make_unique<State>()) {
+  state_->file = file;
+  state_->given = &grid;
+  state_->transfer = transfer;
+  state_->blockEdge = blockEdge;
+  state_->dims = grid.dims;
+  state_->placement = grid.placement;
+  state_->coding = grid.coding;
+  state_->open(backend);
+}
+
+Splatter::Splatter(const AttenuationFile& file, const TransferFunction& transfer, Backend backend, int blockEdge)
+    : state_(std::make_unique<State>()) {
+  state_->file = &file;
+  state_->transfer = transfer;
+  state_->blockEdge = blockEdge;
+  state_->dims = file.dims();
+  state_->placement = file.placement();
+  state_->coding = file.coding();
+  state_->open(backend);
+}
+
+Splatter::~Splatter() = default;
+Splatter::Splatter(Splatter&& other) noexcept = default;
+
+void Splatter::State::open(Backend backend) {
+  check(blockEdge >= 1 && blockEdge <= kLargestBlockEdge, "a block's edge is in range");
   if (file != nullptr && !sameOpacity(transfer, file->transfer())) {
     throw InputError(fmt::format(
         "{}: made with other opacities than the transfer function given; run precompute again with it", file->path()));
   }
   if (backend != Backend::cpu) {
     try {
-      state_->context = std::make_unique<gl::Context>();
+      context = std::make_unique<gl::Context>();
     } catch (const MachineError&) {
       if (backend == Backend::gl) throw;
     }
     // A GL that runs on the CPU is slower there than our own code.
-    if (backend == Backend::automatic && state_->context && state_->context->isSoftware()) state_->context.reset();
+    if (backend == Backend::automatic && context && context->isSoftware()) context.reset();
   }
-  state_->classified = classifyCodes(grid.coding, transfer);
-  state_->table = classificationTable(transfer, grid.coding);
-  state_->blocks = findVisibleBlocks(grid, transfer, blockEdge);
-  state_->cubes = findVisibleCubes(grid, transfer);
+  classified = classifyCodes(coding, transfer);
+  table = classificationTable(transfer, coding);
+  visibility.emplace(transfer, coding);
+  levels.push_back(given != nullptr ? findVisibleBlocks(*given, transfer, blockEdge)
+                                    : FileBlockSource::storedBlocks(*file, 0, blockEdge));
 }
 
-Splatter::~Splatter() = default;
-Splatter::Splatter(Splatter&& other) noexcept = default;
+const ValueGrid& Splatter::State::grid() {
+  if (given != nullptr) return *given;
+  if (!own) own = valueGrid(*file);
+  return *own;
+}
+
+const VisibleCubes& Splatter::State::visibleCubes() {
+  if (!cubes) cubes = findVisibleCubes(grid(), transfer);
+  return *cubes;
+}
+
+const CoarseVolume& Splatter::State::coarseVolume() {
+  if (!coarse) coarse.emplace(*file, classified);
+  return *coarse;
+}
+
+void Splatter::State::findLevels() {
+  for (int level = int(levels.size()); level < file->levels(); ++level)
+    levels.push_back(FileBlockSource::storedBlocks(*file, level, blockEdge));
+}
 
 AttenuationSource Splatter::State::chosen(AttenuationSource source, const Towards& target, bool lamp) const {
   if (source == AttenuationSource::automatic) {
     if (file != nullptr && findPin(*file, target)) return AttenuationSource::pinned;
     // What is stored runs on to the outside, past a target inside the volume.
-    if (file == nullptr || target.inside(grid.dims)) return AttenuationSource::swept;
+    if (file == nullptr || target.inside(dims)) return AttenuationSource::swept;
     return lamp ? AttenuationSource::stored : AttenuationSource::corrected;
   }
   if (source != AttenuationSource::swept && file == nullptr) {
@@ -215,29 +221,26 @@ AttenuationSource Splatter::State::chosen(AttenuationSource source, const Toward
 
 AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, AttenuationSource source,
                                                     Footprint footprint) {
-  if (source == AttenuationSource::swept) return sweptAttenuation(grid, table, cubes, target);
+  if (source == AttenuationSource::swept) return sweptAttenuation(grid(), table, visibleCubes(), target);
   if (source == AttenuationSource::pinned) return pinnedAttenuation(*file, findPin(*file, target).value());
-  AttenuationGrid result = storedAttenuation(
-      *file, target, source == AttenuationSource::quotient ? StoredLookup::quotient : StoredLookup::interpolated);
+  AttenuationGrid result = storedAttenuation(*file, target, lookupOf(source));
   if (source == AttenuationSource::corrected) {
-    if (!coarse) coarse.emplace(grid, classified);
-    coarse->correct(target, result);
-    if (footprint == Footprint::cell) result = withNearField(grid, table, cubes, target, kNearPlanes, result);
+    coarseVolume().correct(target, result);
+    if (footprint == Footprint::cell)
+      result = withNearField(grid(), table, visibleCubes(), target, kNearPlanes, result);
   }
   return result;
 }
 
-void Splatter::State::lightVoxels(const Camera& camera, const SplatOptions& options, SplatStatistics& statistics) {
+LightGrid Splatter::State::lightVoxels(const Camera& camera, const SplatOptions& options, SplatStatistics& statistics) {
   std::vector<LampAttenuation> lamps;
   checkLighting(options.lighting);
   for (const Light& lamp : options.lighting.lights) {
-    const Towards target =
-        lamp.directional ? Towards::direction(grid.placement, lamp.world) : Towards::point(grid.placement, lamp.world);
+    const Towards target = towardsLamp(placement, lamp);
     const AttenuationSource source = chosen(options.lightAttenuation, target, true);
     LampAttenuation attenuation;
     if (source == AttenuationSource::stored || source == AttenuationSource::quotient) {
-      attenuation.stored.emplace(
-          *file, target, source == AttenuationSource::quotient ? StoredLookup::quotient : StoredLookup::interpolated);
+      attenuation.stored.emplace(*file, target, lookupOf(source));
     } else if (source == AttenuationSource::pinned) {
       attenuation.pin = findPin(*file, target);
     } else {
@@ -246,136 +249,119 @@ void Splatter::State::lightVoxels(const Camera& camera, const SplatOptions& opti
     lamps.push_back(std::move(attenuation));
     statistics.lightAttenuation = attenuationSourceName(source);
   }
-  light = lightGrid(grid, cubes, file, options.lighting, camera, lamps);
+  return lightGrid(grid(), visibleCubes(), file, options.lighting, camera, lamps);
 }
 
-Image Splatter::State::drawCells(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
-                                 const SplatOptions& options, float quantum, std::span<const uint8_t> share,
-                                 SplatStatistics& statistics, Progress& progress) {
-  const Clock::time_point setupStart = Clock::now();
-  const std::unique_ptr<CellCanvas> canvas =
-      context ? makeGlCellCanvas(*context, camera.imageSize) : makeCpuCellCanvas(camera.imageSize);
-  const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, share, statistics);
-  rays.resize(size_t(camera.imageSize.x) * size_t(camera.imageSize.y));
-  pixelRays(grid.placement, grid.dims, camera, coveredTiles(view, ordered), rays);
-  CellFrame cells;
-  cells.grid = &grid;
-  cells.attenuation = &attenuation;
-  cells.light = &light;
-  cells.table = &table;
-  cells.view = &view;
-  cells.rays = &rays;
-  cells.edge = blockEdge;
-  cells.inverseQuantum = 1.0f / quantum;
-  // Stored attenuation, corrected or not, is too rough to end a ray.
-  const bool endRays =
-      options.cull == Cull::hidden && (statistics.attenuation == attenuationSourceName(AttenuationSource::swept) ||
-                                       statistics.attenuation == attenuationSourceName(AttenuationSource::pinned));
-  cells.hiddenBelow = endRays ? kHiddenBelow : 0.0f;
-  statistics.setupSeconds += secondsSince(setupStart);
-  const Clock::time_point drawStart = Clock::now();
-  CellCounts counts;
-  canvas->clear();
-  for (size_t first = 0; first < ordered.size(); first += kBlocksPerBatch) {
-    const size_t count = std::min(kBlocksPerBatch, ordered.size() - first);
-    canvas->draw(cells, std::span(ordered).subspan(first, count), counts);
-    progress.advance(count);
+void Splatter::State::shareMemory(Frame& to, uint64_t fixedBytes, uint64_t bytesPerBlock, uint64_t& sourceBytes) const {
+  const uint64_t allowed = to.options.memoryBytes;
+  sourceBytes = UINT64_MAX;
+  if (allowed == 0) return;
+  const uint64_t pixels = uint64_t(to.camera.imageSize.x) * uint64_t(to.camera.imageSize.y);
+  // Rays, and sums as they are drawn, read back and resolved.
+  fixedBytes += pixels * (sizeof(PixelRay) + 4 * kSumChannels * sizeof(float));
+  const uint64_t perBlock = bytesPerBlock + cpuCanvasBytes(blockEdge);
+  if (allowed < fixedBytes + perBlock) {
+    throw MachineError(
+        fmt::format("this picture needs {} bytes of memory, {} are allowed; allow more, or make it smaller",
+                    fixedBytes + perBlock, allowed));
   }
-  Image sums = canvas->wholeQuanta();
-  statistics.blocks = statistics.splats = counts.blocks;
-  statistics.culledBlocks = counts.culledBlocks;
-  statistics.fragments = counts.fragments;
-  statistics.pieces = counts.pieces;
-  statistics.drawSeconds += secondsSince(drawStart);
-  return sums;
+  const uint64_t rest = allowed - fixedBytes;
+  to.blocksAtATime = size_t(std::clamp<uint64_t>(rest / 2 / perBlock, 1, to.blocksAtATime));
+  sourceBytes = rest - to.blocksAtATime * cpuCanvasBytes(blockEdge);
 }
 
-std::vector<VisibleBlock> Splatter::State::blocksToDraw(const AttenuationGrid& attenuation, const SplatOptions& options,
-                                                        std::span<const uint8_t> share,
-                                                        SplatStatistics& statistics) const {
-  std::vector<VisibleBlock> drawn = blocks;
-  if (!share.empty()) {
-    checkEqual(share.size(), blocks.size(), "length of a share");
-    drawn.clear();
-    for (size_t i = 0; i < blocks.size(); ++i) {
-      if (share[i] != 0) drawn.push_back(blocks[i]);
-    }
+void Splatter::State::lookIntoGrids(Frame& to, const Towards& eye, AttenuationSource source) {
+  if (to.options.lodPixels > 0.0) {
+    throw InputError(
+        "swept and pinned attenuation know the finest level only; leave --lod out, or take --attenuation stored");
   }
-  const size_t shared = drawn.size();
-  if (options.cull == Cull::hidden) {
-    std::vector<uint8_t> hidden(shared);
-#pragma omp parallel for schedule(dynamic, 1)
-    for (int64_t i = 0; i < int64_t(shared); ++i)
-      hidden[size_t(i)] =
-          isHidden(drawn[size_t(i)], grid.dims, attenuation, uint16_t(kHiddenBelow * AttenuationGrid::kUnit)) ? 1 : 0;
-    size_t kept = 0;
-    for (size_t i = 0; i < shared; ++i) {
-      if (hidden[i] == 0) drawn[kept++] = drawn[i];
-    }
-    drawn.resize(kept);
-  }
-  statistics.hiddenBlocks = shared - drawn.size();
-  putInOrder(drawn, options.order, 0);
-  return drawn;
+  uint64_t sourceBytes = 0;
+  const uint64_t perVoxel = 2 * sizeof(uint16_t) + (to.options.lighting.unlit() ? 0 : sizeof(LightValue));
+  shareMemory(to, voxelCount(dims) * perVoxel, 0, sourceBytes);
+  to.attenuation = attenuationTowards(eye, source, to.options.footprint);
+  const Clock::time_point lightStart = Clock::now();
+  to.light = lightVoxels(to.camera, to.options, to.statistics);
+  to.lightScale = to.light.scale;
+  to.statistics.lightSeconds = secondsSince(lightStart);
+  to.source = std::make_unique<GridBlockSource>(grid(), &to.attenuation, to.light, blockEdge);
+  to.blocks = levels[0];
 }
 
-Image Splatter::State::drawKernels(const Camera& camera, const VolumeView& view, const AttenuationGrid& attenuation,
-                                   const SplatOptions& options, float quantum, std::span<const uint8_t> share,
-                                   SplatStatistics& statistics, Progress& progress) {
-  const std::unique_ptr<KernelCanvas> canvas =
-      context ? makeGlKernelCanvas(*context, camera.imageSize) : makeCpuKernelCanvas(camera.imageSize);
-  const KernelSetup setup(view, classified,
-                          options.formula == Formula::paper ? KernelEmission::opacity : KernelEmission::telescoping,
-                          quantum, options.cull == Cull::hidden ? kHiddenBelow : 0.0f);
-  statistics.blocks = statistics.culledBlocks = statistics.splats = statistics.culledSplats = statistics.fragments = 0;
-  statistics.hiddenSplats = 0;
-  const std::vector<VisibleBlock> ordered = blocksToDraw(attenuation, options, share, statistics);
-  std::vector<KernelSplat> batch;
-  const auto flush = [&] {
-    const Clock::time_point start = Clock::now();
-    canvas->draw(batch);
-    statistics.splats += batch.size();
-    batch.clear();
-    statistics.drawSeconds += secondsSince(start);
-  };
-  canvas->clear();
-  constexpr size_t kBlocksPerTask = 8;
-  for (size_t first = 0; first < ordered.size(); first += kBlocksPerTask) {
-    const Clock::time_point start = Clock::now();
-    const size_t count = std::min(kBlocksPerTask, ordered.size() - first);
-    std::vector<KernelSplat> splats[kBlocksPerTask];
-    KernelSetup::Counts counts[kBlocksPerTask];
-    bool drawn[kBlocksPerTask] = {};
-#pragma omp parallel for schedule(dynamic, 1)
-    for (int64_t i = 0; i < int64_t(count); ++i) {
-      const VisibleBlock& block = ordered[first + size_t(i)];
-      drawn[i] = setup.mayTouchImage(block.origin, blockEdge);
-      if (!drawn[i]) continue;
-      setup.append(grid, attenuation, light, block.origin, blockEdge, splats[i], counts[i]);
-      putInOrder(splats[i], options.order, 1 + linearIndex(block.origin, grid.dims));
-    }
-    for (size_t i = 0; i < count; ++i) {
-      (drawn[i] ? statistics.blocks : statistics.culledBlocks) += 1;
-      statistics.culledSplats += counts[i].culledSplats;
-      statistics.hiddenSplats += counts[i].hiddenSplats;
-      statistics.fragments += counts[i].fragments;
-      batch.insert(batch.end(), splats[i].begin(), splats[i].end());
-    }
-    statistics.setupSeconds += secondsSince(start);
-    if (batch.size() >= kSplatsPerBatch) flush();
-    progress.advance(count);
+StoredTarget Splatter::State::storedTarget(Frame& to, const Towards& target, AttenuationSource source, bool nearest) {
+  StoredTarget result{target, nearest ? StoredLookup::nearest : lookupOf(source), nullptr};
+  if (source == AttenuationSource::corrected) {
+    to.ratios.push_back(std::make_unique<CoarseRatio>(coarseVolume().ratio(target)));
+    result.ratio = to.ratios.back().get();
   }
-  flush();
-  return canvas->wholeQuanta();
+  return result;
+}
+
+void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSource source) {
+  const SplatOptions& options = to.options;
+  FileBlockSource::View look;
+  look.white = std::all_of(transfer.points.begin(), transfer.points.end(),
+                           [](const TransferPoint& point) { return point.srgb == glm::dvec3(1.0); });
+  if (options.lodPixels > 0.0 && file->levels() > 1 && !look.white && !sameColours(transfer, file->transfer())) {
+    throw InputError(fmt::format(
+        "{}: levels hold colours, those of its own transfer function; leave --lod out, or run precompute again",
+        file->path()));
+  }
+  look.eye = storedTarget(to, eye, source, options.formula == Formula::paper);
+  const Clock::time_point lightStart = Clock::now();
+  checkLighting(options.lighting);
+  uint64_t fixedBytes = 0;
+  if (!options.lighting.unlit()) {
+    to.lighting.emplace(placement, options.lighting, to.camera);
+    to.lightScale = to.lighting->scale();
+    look.lighting = &*to.lighting;
+    to.swept.resize(options.lighting.lights.size());
+    for (size_t i = 0; i < to.swept.size(); ++i) {
+      const Towards target = towardsLamp(placement, options.lighting.lights[i]);
+      const AttenuationSource ofLamp = chosen(options.lightAttenuation, target, true);
+      to.statistics.lightAttenuation = attenuationSourceName(ofLamp);
+      LampSource lamp;
+      // Corrected attenuation is traced near the voxel, pinned is swept: both are of the whole volume.
+      if (ofLamp == AttenuationSource::swept || ofLamp == AttenuationSource::pinned ||
+          ofLamp == AttenuationSource::corrected) {
+        to.swept[i].grid = attenuationTowards(target, ofLamp, options.footprint);
+        lamp.swept = &to.swept[i].grid;
+        fixedBytes += voxelCount(dims) * sizeof(uint16_t);
+      } else {
+        lamp.stored = storedTarget(to, target, ofLamp, false);
+      }
+      look.lamps.push_back(lamp);
+    }
+  }
+  to.statistics.lightSeconds = secondsSince(lightStart);
+  if (coarse) fixedBytes += coarse->bytes();
+  for (const auto& ratio : to.ratios)
+    fixedBytes += ratio->bytes();
+  uint64_t sourceBytes = 0;
+  shareMemory(to, fixedBytes,
+              FileBlockSource::bytesPerBlock(blockEdge, file->brickEdge(), look.lighting != nullptr,
+                                             look.lighting != nullptr && look.lighting->shaded()),
+              sourceBytes);
+  to.source = std::make_unique<FileBlockSource>(*file, std::move(look), absent, blockEdge, sourceBytes);
+  if (options.lodPixels > 0.0) {
+    findLevels();
+    to.blocks = selectBlocks(levels, blockEdge, to.view, options.lodPixels);
+  } else {
+    to.blocks = levels[0];
+  }
 }
 
 std::span<const VisibleBlock> Splatter::blocks() const {
-  return state_->blocks;
+  return state_->frame ? state_->frame->blocks : state_->levels[0];
 }
 
 void Splatter::prepare(const Camera& camera, const SplatOptions& options) {
   State& state = *state_;
-  SplatStatistics statistics;
+  state.frame.reset();
+  auto frame = std::make_unique<State::Frame>();
+  frame->camera = camera;
+  frame->options = options;
+  frame->view = volumeView(state.placement, camera);
+  SplatStatistics& statistics = frame->statistics;
   statistics.passes = 0;
   statistics.backend = state.context ? "gl" : "cpu";
   if (state.context) statistics.glRenderer = state.context->renderer();
@@ -383,9 +369,8 @@ void Splatter::prepare(const Camera& camera, const SplatOptions& options) {
   if (paper && options.footprint != Footprint::kernel) {
     throw InputError("formula paper is defined for the kernel footprint; add --footprint kernel");
   }
-
   const Clock::time_point attenuationStart = Clock::now();
-  const Towards eye = towardsEye(state.grid, camera);
+  const Towards eye = towardsEye(state.placement, camera);
   // The paper looks up the nearest direction, wherever the eye is.
   AttenuationSource source = options.attenuation;
   if (paper && source == AttenuationSource::automatic) source = AttenuationSource::stored;
@@ -394,30 +379,64 @@ void Splatter::prepare(const Camera& camera, const SplatOptions& options) {
   }
   source = state.chosen(source, eye, false);
   statistics.attenuation = attenuationSourceName(source);
-  state.frame.reset();
-  AttenuationGrid attenuation = paper ? storedAttenuation(*state.file, eye, StoredLookup::nearest)
-                                      : state.attenuationTowards(eye, source, options.footprint);
-  statistics.attenuationSeconds = secondsSince(attenuationStart);
-  const Clock::time_point lightStart = Clock::now();
-  state.lightVoxels(camera, options, statistics);
-  statistics.lightSeconds = secondsSince(lightStart);
-  state.frame.emplace(State::Frame{camera, options, volumeView(state.grid.placement, camera), std::move(attenuation),
-                                   std::move(statistics)});
+  // What is swept, or traced near the voxel, is an array of the whole volume.
+  const bool nearField = source == AttenuationSource::corrected && options.footprint == Footprint::cell;
+  if (source == AttenuationSource::swept || source == AttenuationSource::pinned ||
+      (nearField && options.lodPixels == 0.0)) {
+    state.lookIntoGrids(*frame, eye, source);
+  } else {
+    state.lookIntoFile(*frame, eye, source);
+  }
+  statistics.attenuationSeconds = secondsSince(attenuationStart) - statistics.lightSeconds;
+  state.frame = std::move(frame);
 }
 
 Sums Splatter::draw(float quantum, std::span<const uint8_t> share, Progress& progress) {
   State& state = *state_;
-  check(state.frame.has_value(), "a frame is prepared before it is drawn");
-  auto& [camera, options, view, attenuation, statistics] = *state.frame;
+  check(state.frame != nullptr, "a frame is prepared before it is drawn");
+  State::Frame& frame = *state.frame;
+  SplatStatistics& statistics = frame.statistics;
   ++statistics.passes;
-  Sums sums;
-  progress.begin("splatting", state.blocks.size(), "blocks");
-  sums.image = options.footprint == Footprint::cell
-                   ? state.drawCells(camera, view, attenuation, options, quantum, share, statistics, progress)
-                   : state.drawKernels(camera, view, attenuation, options, quantum, share, statistics, progress);
+  statistics.blocks = statistics.culledBlocks = statistics.hiddenBlocks = statistics.emptyBlocks = 0;
+  statistics.splats = statistics.culledSplats = statistics.hiddenSplats = statistics.fragments = statistics.pieces = 0;
+  statistics.blocksOfLevel.clear();
+  statistics.splatsOfLevel.clear();
+  std::vector<VisibleBlock> drawn = frame.blocks;
+  if (!share.empty()) {
+    checkEqual(share.size(), frame.blocks.size(), "length of a share");
+    drawn.clear();
+    for (size_t i = 0; i < frame.blocks.size(); ++i) {
+      if (share[i] != 0) drawn.push_back(frame.blocks[i]);
+    }
+  }
+  progress.begin("splatting", drawn.size(), "blocks");
+  Sums sums = drawFrameBlocks(drawn, quantum, progress);
   progress.end();
+  return sums;
+}
+
+Sums Splatter::drawFrameBlocks(std::span<const VisibleBlock> blocks, float quantum, Progress& progress) {
+  State& state = *state_;
+  State::Frame& frame = *state.frame;
+  FrameDrawing drawing;
+  drawing.source = frame.source.get();
+  drawing.placement = &state.placement;
+  drawing.classified = &state.classified;
+  drawing.table = &state.table;
+  drawing.visibility = &*state.visibility;
+  drawing.camera = &frame.camera;
+  drawing.view = &frame.view;
+  drawing.options = &frame.options;
+  drawing.context = state.context.get();
+  // Stored attenuation, corrected or not, is too rough to end a ray.
+  drawing.endRays = frame.statistics.attenuation == attenuationSourceName(AttenuationSource::swept) ||
+                    frame.statistics.attenuation == attenuationSourceName(AttenuationSource::pinned);
+  drawing.blocksAtATime = frame.blocksAtATime;
+  drawing.rays = &frame.rays;
+  Sums sums;
+  sums.image = drawBlocks(drawing, blocks, quantum, frame.statistics, progress);
   sums.quantum = quantum;
-  sums.lightScale = state.light.scale;
+  sums.lightScale = frame.lightScale;
   // Powers of two: exact.
   const float units[kSumChannels] = {quantum, quantum, quantum, quantum, shared::kDepthHighUnit, shared::kDepthLowUnit};
   std::vector<float>& values = sums.image.pixels;
@@ -430,10 +449,10 @@ Sums Splatter::draw(float quantum, std::span<const uint8_t> share, Progress& pro
 }
 
 std::vector<BlockWork> Splatter::countWork(const Camera& camera) const {
-  const VolumeView view = volumeView(state_->grid.placement, camera);
+  const VolumeView view = volumeView(state_->placement, camera);
   std::vector<BlockWork> work;
-  work.reserve(state_->blocks.size());
-  for (const VisibleBlock& block : state_->blocks) {
+  work.reserve(blocks().size());
+  for (const VisibleBlock& block : blocks()) {
     const PixelBounds bounds = pixelBounds(view, block);
     const glm::ivec2 size = bounds.empty() ? glm::ivec2(0) : bounds.high - bounds.low;
     work.push_back({bounds.empty() ? 0 : block.visibleCells, uint64_t(size.x) * uint64_t(size.y)});
@@ -442,7 +461,7 @@ std::vector<BlockWork> Splatter::countWork(const Camera& camera) const {
 }
 
 const SplatStatistics& Splatter::statistics() const {
-  check(state_->frame.has_value(), "a frame is prepared before its statistics are read");
+  check(state_->frame != nullptr, "a frame is prepared before its statistics are read");
   return state_->frame->statistics;
 }
 
@@ -462,23 +481,26 @@ BlendedResult Splatter::renderBlended(const Camera& camera, BlendKernel kernel, 
   BlendedResult result;
   SplatStatistics& statistics = result.statistics;
   statistics.backend = "cpu";
-  const VolumeView view = volumeView(state.grid.placement, camera);
+  const VolumeView view = volumeView(state.placement, camera);
   const Clock::time_point lightStart = Clock::now();
-  state.lightVoxels(camera, options, statistics);
+  const LightGrid light = state.lightVoxels(camera, options, statistics);
   statistics.lightSeconds = secondsSince(lightStart);
   const Clock::time_point setupStart = Clock::now();
   const KernelSetup setup(view, state.classified,
                           kernel == BlendKernel::gaussian ? KernelEmission::peak : KernelEmission::telescoping, 1.0f,
                           0.0f);
+  const GridBlockSource source(state.grid(), nullptr, light, state.blockEdge);
   std::vector<BlendSplat> splats;
   KernelSetup::Counts counts;
-  for (const VisibleBlock& block : state.blocks) {
+  BlockSamples samples;
+  for (const VisibleBlock& block : state.levels[0]) {
     if (!setup.mayTouchImage(block.origin, state.blockEdge)) {
       ++statistics.culledBlocks;
       continue;
     }
     ++statistics.blocks;
-    setup.appendWithDistance(state.grid, state.light, block.origin, state.blockEdge, splats, counts);
+    source.gather(block, samples);
+    setup.appendWithDistance(samples, block, state.dims, state.blockEdge, splats, counts);
   }
   statistics.splats = splats.size();
   statistics.culledSplats = counts.culledSplats;
@@ -488,7 +510,7 @@ BlendedResult Splatter::renderBlended(const Camera& camera, BlendKernel kernel, 
   progress.begin("blending", 1, "pictures");
   result.image = blendKernels(std::move(splats), kernel, camera.imageSize);
   for (size_t i = 0; i < result.image.pixels.size(); ++i) {
-    if (i % 4 != 3) result.image.pixels[i] *= state.light.scale;
+    if (i % 4 != 3) result.image.pixels[i] *= light.scale;
   }
   progress.advance(1);
   progress.end();

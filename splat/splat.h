@@ -13,6 +13,7 @@
 #include "hierarchy/attenuation_file.h"
 #include "hierarchy/value_grid.h"
 #include "splat/blend_kernels.h"
+#include "splat/block_source.h"
 #include "splat/sums.h"
 #include "splat/visible_blocks.h"
 #include "volume/transfer_function.h"
@@ -32,7 +33,8 @@ enum class AttenuationSource {
   automatic,  ///< pinned, if the file has a pin that is the target; else with an attenuation file, and the target
               ///< outside the volume: `corrected` for the eye and `stored` for lamps; else swept
   stored,     ///< the 26 directions of the file, which run on to the outside even if the target is inside
-  corrected,  ///< stored, corrected by a sweep of a coarse copy of the volume, and right before a voxel traced
+  corrected,  ///< stored, corrected by a sweep of a coarse copy of the volume, and right before a voxel traced (which
+              ///< takes the values of the whole volume, and is left out where blocks of coarser levels are drawn)
   swept,      ///< one sweep over the values for this target
   pinned,     ///< a sweep for this target that the file holds: the bits that `swept` gives
   quotient,   ///< stored, divided by the same at the target's own voxel: the paper's A_B / A_V for an eye inside
@@ -40,6 +42,7 @@ enum class AttenuationSource {
 
 /// What is left out of a picture because nobody sees it. Deterministic: the same bits in any order.
 enum class Cull {
+  off,     ///< nothing: cells, off the image, empty or not, are all traced. Only to show that `none` changes no bit
   none,    ///< only what adds nothing
   hidden,  ///< also what hardly any light reaches the eye from (docs/fidelity.md has what that changes)
 };
@@ -58,14 +61,22 @@ struct SplatOptions {
   Lighting lighting;
   Cull cull = Cull::none;
   SplatOrder order;
+  /// From an attenuation file, blocks are drawn at the coarsest level whose voxels are no larger than this on the
+  /// image, in pixels; 0: at the finest.
+  double lodPixels = 0.0;
+  /// Bytes that may be taken by buffers and textures, and by everything else whose size depends on volume or image; 0:
+  /// as many as there are. Neither changes a bit of the result.
+  uint64_t gpuMemoryBytes = 0, memoryBytes = 0;
   float firstQuantum = 0x1p-20f;  ///< raised by 4 until the sums prove exact; a power of two
 };
 
 struct SplatStatistics {
-  uint64_t blocks = 0;           ///< drawn
-  uint64_t culledBlocks = 0;     ///< outside the view frustum
-  uint64_t hiddenBlocks = 0;     ///< dropped by Cull::hidden
-  uint64_t splats = 0;           ///< drawn: of cells, blocks; of kernels, voxels
+  uint64_t blocks = 0;                                 ///< drawn
+  uint64_t culledBlocks = 0;                           ///< outside the view frustum
+  uint64_t hiddenBlocks = 0;                           ///< dropped by Cull::hidden
+  uint64_t emptyBlocks = 0;                            ///< of those in the file: nothing in them is visible
+  std::vector<uint64_t> blocksOfLevel, splatsOfLevel;  ///< drawn, at each level
+  uint64_t splats = 0;                                 ///< drawn: of cells, blocks; of kernels, voxels
   uint64_t culledSplats = 0;     ///< of kernels: visible voxels off screen or nearer than the near plane
   uint64_t hiddenSplats = 0;     ///< of kernels: dropped by Cull::hidden
   uint64_t fragments = 0;        ///< pixels that splats' bounding rectangles covered
@@ -75,6 +86,7 @@ struct SplatStatistics {
   std::string glRenderer;        ///< empty for cpu
   std::string attenuation;       ///< towards the eye: name of the source
   std::string lightAttenuation;  ///< the same towards lamps, of the last one; empty without any
+  uint64_t glBytes = 0;          ///< most that buffers and textures took at once
   double attenuationSeconds = 0, lightSeconds = 0, setupSeconds = 0, drawSeconds = 0;
 };
 
@@ -107,14 +119,19 @@ class Splatter {
  public:
   /// `grid` and `file` must outlive the splatter; `file` may be null (then attenuation is always swept). The opacities
   /// of `transfer` must be those that the file was made with (opacityHash).
-  /// `blockEdge`: 1 to 61. Throws InputError (transfer function), MachineError (no GL where it was asked for).
+  /// `blockEdge`: 1 to kLargestBlockEdge. Throws InputError (transfer function), MachineError (no GL where it was asked
+  /// for).
   Splatter(const ValueGrid& grid, const AttenuationFile* file, const TransferFunction& transfer, Backend backend,
            int blockEdge = kBlockEdge);
+  /// From the file alone, which must outlive the splatter: values are read block by block, and as a whole only for what
+  /// sweeps or blends them.
+  Splatter(const AttenuationFile& file, const TransferFunction& transfer, Backend backend, int blockEdge = kBlockEdge);
   ~Splatter();
   Splatter(Splatter&& other) noexcept;
   Splatter& operator=(Splatter&&) = delete;
 
-  /// The blocks in which something is visible, along the Hilbert curve.
+  /// The blocks in which something may be visible: those that a prepared frame is to draw, else those of the finest
+  /// level, which a frame with lodPixels = 0 has too. Along the Hilbert curve, coarsest level first.
   std::span<const VisibleBlock> blocks() const;
 
   /// Same bits for any order, thread count and backend. Throws InputError or MachineError.
@@ -139,6 +156,8 @@ class Splatter {
 
  private:
   struct State;
+  Sums drawFrameBlocks(std::span<const VisibleBlock> blocks, float quantum, Progress& progress);
+
   std::unique_ptr<State> state_;
 };
 

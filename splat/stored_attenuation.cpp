@@ -53,9 +53,10 @@ constexpr double kNearBricks = 4.0;
 
 }  // namespace
 
-StoredAttenuation::StoredAttenuation(const AttenuationFile& file, const Towards& towards, StoredLookup lookup)
+StoredAttenuation::StoredAttenuation(const AttenuationFile& file, const Towards& towards, StoredLookup lookup,
+                                     int level)
     : file_(file),
-      towards_(towards),
+      towards_(towards.ofLevel(level)),
       lookup_(lookup),
       squaredLength_(glm::transpose(towards.lengthFromIndex) * towards.lengthFromIndex) {
   if (lookup != StoredLookup::quotient || !towards.inside(file.dims())) return;
@@ -74,10 +75,10 @@ int StoredAttenuation::nearest(glm::dvec3 voxel) const {
   return nearestDirection(towards_.lengthFromIndex, towards_.lengthFromIndex * towards_.from(voxel));
 }
 
-DirectionSet StoredAttenuation::directions(size_t i) const {
+DirectionSet StoredAttenuation::directions(glm::ivec3 first) const {
   if (file_.layout() == Layout::dense) return kAllDirections;  // they cost nothing there
   // Voxels of the brick beyond the volume are looked up too.
-  const glm::ivec3 first = file_.brickOrigin(i), last = first + (file_.brickEdge() - 1);
+  const glm::ivec3 last = first + (file_.brickEdge() - 1);
   const auto needed = [&](glm::dvec3 voxel) {
     return lookup_ == StoredLookup::nearest ? DirectionSet(1) << nearest(voxel)
                                             : directionsOf(directionTriangle(towards_.from(voxel)));
@@ -197,7 +198,7 @@ AttenuationGrid storedAttenuation(const AttenuationFile& file, const Towards& to
   result.values.assign(voxelCount(dims), uint16_t(AttenuationGrid::kUnit));
   result.setOpenFaces(towards, dims);
   const auto lookUpBrick = [&](size_t b) {
-    const BrickView brick = file.brick(b, stored.directions(b));
+    const BrickView brick = file.brick(b, stored.directions(file.brickOrigin(b)));
     std::vector<float> attenuation(brick.curve.size());
     stored.look(brick, attenuation);
     for (size_t step = 0; step < attenuation.size(); ++step) {

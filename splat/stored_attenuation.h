@@ -20,11 +20,11 @@ enum class StoredLookup {
 
 class StoredAttenuation {
  public:
-  /// `file` must outlive this.
-  StoredAttenuation(const AttenuationFile& file, const Towards& towards, StoredLookup lookup);
+  /// `file` must outlive this. `towards`: in the index space of the finest level; `level`: of the bricks.
+  StoredAttenuation(const AttenuationFile& file, const Towards& towards, StoredLookup lookup, int level = 0);
 
-  /// The stored directions that `look` needs of brick i.
-  DirectionSet directions(size_t i) const;
+  /// The stored directions that `look` needs of the brick that begins with this voxel of the level.
+  DirectionSet directions(glm::ivec3 brickOrigin) const;
 
   /// Attenuation, 0..1, at every step along the brick's curve; edge^3 entries. Voxels outside the volume get any number
   /// in that range. May be called from many threads.

@@ -13,7 +13,7 @@ namespace {
 
 struct CellRange {
   glm::ivec3 low{INT32_MAX}, high{INT32_MIN};
-  uint32_t count = 0;
+  uint64_t count = 0;
   bool empty() const { return low.x >= high.x; }
 };
 
@@ -67,7 +67,7 @@ std::vector<VisibleBlock> findVisibleBlocks(const ValueGrid& grid, const Transfe
   for (int z = 0; z < blocks.z; ++z) {
     for (int y = 0; y < blocks.y; ++y) {
       for (int x = 0; x < blocks.x; ++x) {
-        // A piece of a ray ends up to one cell beside the block that owns it.
+        // One cell to spare on every side, for those who look at what lies between two voxels.
         const glm::ivec3 origin = glm::ivec3(x, y, z) * edge;
         CellRange range;
         for (int n = 0; n < 27; ++n) {
@@ -83,7 +83,7 @@ std::vector<VisibleBlock> findVisibleBlocks(const ValueGrid& grid, const Transfe
         }
         if (!range.empty())
           found.emplace_back(hilbertIndex({x, y, z}, order),
-                             VisibleBlock{origin, range.low, range.high, own[linearIndex({x, y, z}, blocks)].count});
+                             VisibleBlock{origin, range.low, range.high, 0, own[linearIndex({x, y, z}, blocks)].count});
       }
     }
   }

@@ -24,6 +24,16 @@ VolumeView volumeView(const Placement& placement, const Camera& camera) {
   return view;
 }
 
+VolumeView ofLevel(const VolumeView& finest, int level) {
+  VolumeView view = finest;
+  const double voxels = double(1 << level);
+  view.viewOrigin += finest.viewFromIndex * glm::dvec3(0.5 * (voxels - 1.0));
+  view.viewFromIndex *= voxels;
+  view.indexFromView /= voxels;
+  view.voxelVolume *= voxels * voxels * voxels;
+  return view;
+}
+
 int nearestDirection(const glm::dmat3& edges, glm::dvec3 towards) {
   int nearest = 0;
   double best = -2.0;

@@ -24,6 +24,9 @@ struct VolumeView {
   glm::dvec3 viewPosition(glm::dvec3 index) const { return viewOrigin + viewFromIndex * index; }
 };
 
+/// The same for the voxels of a level, of 2^level edges an edge; lengths stay in shortest edges of the finest one.
+VolumeView ofLevel(const VolumeView& finest, int level);
+
 VolumeView volumeView(const Placement& placement, const Camera& camera);
 
 /// The smallest distance along the line of sight, in shortest voxel edges, at which a kernel splat is drawn in

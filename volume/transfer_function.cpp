@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <limits>
 
 #include "base/error.h"
@@ -110,21 +111,37 @@ uint64_t opacityHash(const TransferFunction& transfer) {
   return XXH3_64bits(figures.data(), figures.size() * sizeof(double));
 }
 
-bool sameOpacity(const TransferFunction& a, const TransferFunction& b) {
-  if (a.low != b.low || a.high != b.high || a.referenceLength != b.referenceLength || a.isLabels != b.isLabels) {
-    return false;
-  }
+namespace {
+
+/// Whether f(transfer, value) holds on both sides of every corner of either; in between all is linear.
+template <class F>
+bool atEveryCorner(const TransferFunction& a, const TransferFunction& b, F&& f) {
   std::vector<double> corners{a.low, a.high};
   for (const TransferFunction* transfer : {&a, &b}) {
     for (const TransferPoint& point : transfer->points)
       corners.push_back(point.value);
   }
-  // Linear in between, so it is enough to look at both sides of every corner.
   return std::all_of(corners.begin(), corners.end(), [&](double corner) {
-    constexpr double kTolerance = 1e-12;
-    const double below = std::nextafter(corner, -std::numeric_limits<double>::infinity());
-    return std::abs(a.opacityAt(corner) - b.opacityAt(corner)) <= kTolerance &&
-           std::abs(a.opacityAt(below) - b.opacityAt(below)) <= kTolerance;
+    return f(corner) && f(std::nextafter(corner, -std::numeric_limits<double>::infinity()));
+  });
+}
+
+constexpr double kSameWithin = 1e-12;
+
+}  // namespace
+
+bool sameOpacity(const TransferFunction& a, const TransferFunction& b) {
+  if (a.low != b.low || a.high != b.high || a.referenceLength != b.referenceLength || a.isLabels != b.isLabels) {
+    return false;
+  }
+  return atEveryCorner(a, b,
+                       [&](double value) { return std::abs(a.opacityAt(value) - b.opacityAt(value)) <= kSameWithin; });
+}
+
+bool sameColours(const TransferFunction& a, const TransferFunction& b) {
+  return atEveryCorner(a, b, [&](double value) {
+    const glm::dvec3 difference = glm::abs(a.srgbAt(value) - b.srgbAt(value));
+    return std::max({difference.x, difference.y, difference.z}) <= kSameWithin;
   });
 }
 

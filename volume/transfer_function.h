@@ -61,6 +61,8 @@ uint64_t opacityHash(const TransferFunction& transfer);
 /// Whether two functions give every value the same opacity to 1e-12, whatever their colours and wherever their points
 /// lie: then they share attenuation, though their hashes may differ.
 bool sameOpacity(const TransferFunction& a, const TransferFunction& b);
+/// Whether both give every value the same colour, where it is visible or not.
+bool sameColours(const TransferFunction& a, const TransferFunction& b);
 
 /// `Classified` sampled at `size` equally spaced values over the range, both ends included; size >= 2.
 std::vector<Classified> transferTable(const TransferFunction& transfer, size_t size);

@@ -12,6 +12,8 @@ FREEVOXEL_BEGIN_SHARED
 struct PixelRay {
   float baseB, baseC;
   float slopeB, slopeC;
+  // 1 / slopeB and 1 / slopeC; 0 where the slope is 0, which slopes are that move a ray by nothing.
+  float perSlopeB, perSlopeC;
   // The part of the ray inside the volume's box and before the eye, in units of s; empty if sLow >= sHigh.
   float sLow, sHigh;
   // Way through the volume per unit of s, in shortest voxel edges.
@@ -35,16 +37,22 @@ struct TableValue {
   float red, green, blue, extinction;
 };
 
-// A block as rays along one dominant axis a see it, with b and c as in PixelRay. Positions count voxels of the volume.
+// A block as rays along one dominant axis a see it, with b and c as in PixelRay. Places count voxels of the block's
+// level from the corner that is voxel (0,0,0) of the finest one, so that a place is 2^-level times that of the finest
+// level: voxel n of a level lies at place n + offset.
 struct CellLayout {
   int originA, originB, originC;  // first voxel
   int strideA, strideB, strideC;  // in the block's array, which starts at origin - 1
-  int firstA, endA;               // lower planes of the pieces that may see something
-  float lastB, lastC;             // of the volume's voxels
-  float ownLowB, ownHighB;        // pieces whose lower end lies in here belong to the block
-  float ownLowC, ownHighC;
-  int lit;      // 0 or 1: whether voxels have light of their own
-  int samples;  // where the block's array starts, in voxels
+  // What the block owns of every ray: the part inside this box, as far as something is visible there. Blocks that touch
+  // have one number for the face between them, whatever their levels.
+  float lowA, highA, lowB, highB, lowC, highC;
+  float lastB, lastC;  // of the level's voxels
+  float perVoxel;      // 2^-level
+  float voxels;        // 2^level
+  float offset;        // (1 - 2^-level) / 2
+  int lit;             // 0 or 1: whether voxels have light of their own
+  int samples;         // where the block's array starts, in voxels
+  int matter;  // the same in the array of classified voxels; -1: voxels have values, which is so at level 0 only
 };
 
 // What one block gives to one pixel; depth in log2. `pieces`: how many pieces of the ray that took.

@@ -16,6 +16,7 @@
 #define SHARED_FUNCTION inline
 #define SHARED_CONSTANT inline constexpr
 #define SHARED_OUT(type) type&
+#define SHARED_INOUT(type) type&
 
 namespace freevoxel::shared {
 using uint = uint32_t;
@@ -41,6 +42,7 @@ inline float min(float a, float b) {
 #define SHARED_FUNCTION
 #define SHARED_CONSTANT const
 #define SHARED_OUT(type) out type
+#define SHARED_INOUT(type) inout type
 
 #endif
 

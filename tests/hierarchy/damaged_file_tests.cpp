@@ -26,7 +26,7 @@ namespace {
 std::string makeFile(glm::ivec3 dims, uint32_t seed, Layout layout) {
   const std::string path = test::temporaryFolder() + "/made.fvx";
   precompute(test::randomBytes(dims, seed), test::veilAndRamp(), path,
-             {Classification::voxel, layout, 8, "made by a test"}, test::silentProgress());
+             {Classification::voxel, layout, 8, "made by a test", 0, 1}, test::silentProgress());
   return test::readBytes(path);
 }
 
@@ -313,8 +313,10 @@ TEST(ForgedFile, metadata) {
   expectRefused("classification", offsetof(Metadata, classification), uint32_t(2));
   expectRefused("layout", offsetof(Metadata, layout), uint32_t(2));
   expectRefused("a section ZCOD, found none", offsetof(Metadata, layout), uint32_t(1));
-  expectRefused("levels", offsetof(Metadata, levels), uint32_t(2));
-  expectRefused("reserved", offsetof(Metadata, zero0), uint32_t(1));
+  expectRefused("a section LEVL, found none", offsetof(Metadata, levels), uint32_t(2));
+  expectRefused("levels", offsetof(Metadata, levels), uint32_t(0));
+  expectRefused("levels", offsetof(Metadata, levels), uint32_t(5));
+  expectRefused("hierarchy", offsetof(Metadata, hierarchy), uint32_t(1));
   expectRefused("reserved", offsetof(Metadata, zero1), uint64_t(1));
   expectRefused("voxels", offsetof(Metadata, voxels), uint64_t(1));
   expectRefused("stored voxels", offsetof(Metadata, storedVoxels), uint64_t(1));

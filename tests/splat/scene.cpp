@@ -41,6 +41,7 @@ Scene makeScene(Volume volume, TransferFunction transfer, int brickEdge, Classif
   PrecomputeOptions options;
   options.brickEdge = brickEdge;
   options.classification = classification;
+  options.levels = 0;
   precompute(scene.volume, scene.transfer, path, options, silentProgress());
   scene.file = std::make_unique<AttenuationFile>(path);
   return scene;

@@ -1,0 +1,20 @@
+// Options of levels and of memory, and what pictures drawn with them tell.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "app/session.h"
+#include "splat/splat.h"
+
+namespace freevoxel {
+
+/// --lod, --gpu-memory, --memory.
+void addLevelOptions(CLI::App& command, SplatOptions& options);
+
+/// Blocks and splats of each level, and what was left out and why.
+void reportLevels(const SplatStatistics& statistics, Session& session);
+
+/// Of --memory, what the program takes beside volume and image: libraries, threads' stacks, tables.
+uint64_t withoutProgram(uint64_t memoryBytes);
+
+}  // namespace freevoxel

@@ -1,0 +1,383 @@
+#include "splat/file_block_source.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <glm/glm.hpp>
+#include <glm/gtc/packing.hpp>
+#include <utility>
+
+#include "base/error.h"
+#include "base/first_exception.h"
+#include "base/grid.h"
+#include "hierarchy/absent_bricks.h"
+#include "precompute/hilbert.h"
+#include "precompute/stored_bricks.h"
+#include "splat/grid_block_source.h"
+
+namespace freevoxel {
+
+namespace {
+
+/// Positions take 21 bits along each axis (validDims), levels the rest.
+constexpr int kPositionBits = 19;
+
+glm::ivec3 atIndex(size_t i, int edge) {
+  return {int(i) % edge, int(i) / edge % edge, int(i) / (edge * edge)};
+}
+
+/// Extinction that a surface's colour fully counts from, in log2 per shortest edge: an opacity of a half.
+constexpr float kOpaqueExtinction = 1.0f;
+
+}  // namespace
+
+FileBlockSource::FileBlockSource(const AttenuationFile& file, View view, std::vector<uint16_t>& absent, int edge,
+                                 uint64_t memoryBytes)
+    : file_(file), view_(std::move(view)), absent_(absent), edge_(edge), memoryBytes_(memoryBytes) {
+  checkEqual(view_.lamps.size(), view_.lighting == nullptr ? 0 : view_.lighting->lighting().lights.size(),
+             "lamps and what lies before them");
+  for (int level = 0; level < file.levels(); ++level) {
+    Level looked{StoredAttenuation(file, view_.eye.towards, view_.eye.lookup, level), {}};
+    for (const LampSource& lamp : view_.lamps) {
+      looked.lamps.emplace_back();
+      if (lamp.stored) looked.lamps.back().emplace(file, lamp.stored->towards, lamp.stored->lookup, level);
+    }
+    levels_.push_back(std::move(looked));
+  }
+}
+
+uint64_t FileBlockSource::bytesPerBlock(int edge, int brickEdge, bool lit, bool shaded) {
+  // The block, its apron of one voxel before and two behind, wherever it lies among the bricks.
+  const auto bricks = uint64_t((edge + 2) / brickEdge + 2);
+  const uint64_t around = shaded ? bricks + 2 : bricks;
+  const auto voxels = uint64_t(brickEdge) * uint64_t(brickEdge) * uint64_t(brickEdge);
+  return voxels * (bricks * bricks * bricks * (sizeof(uint16_t) + (lit ? sizeof(LightValue) : 0)) +
+                   around * around * around * sizeof(TableEntry));
+}
+
+std::vector<VisibleBlock> FileBlockSource::storedBlocks(const AttenuationFile& file, int level, int edge) {
+  const glm::ivec3 dims = file.levelDims(level), blocks = brickDims(dims, edge);
+  std::vector<uint8_t> stored(voxelCount(blocks), 0);
+  std::vector<uint64_t> visible(stored.size(), 0);
+  const auto brickVoxels = uint64_t(file.brickEdge()) * uint64_t(file.brickEdge()) * uint64_t(file.brickEdge());
+  for (size_t i = 0; i < file.levelBrickCount(level); ++i) {
+    const glm::ivec3 origin = file.levelBrickOrigin(level, i);
+    visible[linearIndex(origin / edge, blocks)] += level == 0 ? file.visibleVoxelsOf(i) : brickVoxels;
+    const glm::ivec3 low = origin / edge, high = glm::min(origin + (file.brickEdge() - 1), dims - 1) / edge;
+    for (int z = low.z; z <= high.z; ++z) {
+      for (int y = low.y; y <= high.y; ++y) {
+        for (int x = low.x; x <= high.x; ++x)
+          stored[linearIndex({x, y, z}, blocks)] = 1;
+      }
+    }
+  }
+  std::vector<std::pair<uint64_t, VisibleBlock>> found;
+  const int order = hilbertOrder(blocks);
+  for (int z = 0; z < blocks.z; ++z) {
+    for (int y = 0; y < blocks.y; ++y) {
+      for (int x = 0; x < blocks.x; ++x) {
+        if (stored[linearIndex({x, y, z}, blocks)] == 0) continue;
+        const glm::ivec3 origin = glm::ivec3(x, y, z) * edge;
+        found.emplace_back(hilbertIndex({x, y, z}, order),
+                           VisibleBlock{origin, origin, origin + edge, level, visible[linearIndex({x, y, z}, blocks)]});
+      }
+    }
+  }
+  std::sort(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<VisibleBlock> result;
+  for (const auto& [index, block] : found)
+    result.push_back(block);
+  return result;
+}
+
+uint64_t FileBlockSource::key(const Place& place) {
+  const auto part = [](int value, int shift) { return uint64_t(value) << shift; };
+  return part(place.position.x, 0) | part(place.position.y, kPositionBits) | part(place.position.z, 2 * kPositionBits) |
+         part(place.level, 3 * kPositionBits);
+}
+
+const FileBlockSource::Brick& FileBlockSource::brick(const Place& place) const {
+  const auto found = bricks_.find(key(place));
+  check(found != bricks_.end(), "bricks of a block are ready");
+  return found->second;
+}
+
+std::vector<FileBlockSource::Place> FileBlockSource::bricksOf(std::span<const VisibleBlock> blocks) const {
+  const int brickEdge = file_.brickEdge();
+  std::unordered_map<uint64_t, Place> needed;
+  for (const VisibleBlock& block : blocks) {
+    const glm::ivec3 last = dims(block.level) - 1;
+    const glm::ivec3 low = glm::clamp(block.origin - 1, glm::ivec3(0), last) / brickEdge;
+    const glm::ivec3 high = glm::clamp(block.origin + edge_ + 1, glm::ivec3(0), last) / brickEdge;
+    for (int z = low.z; z <= high.z; ++z) {
+      for (int y = low.y; y <= high.y; ++y) {
+        for (int x = low.x; x <= high.x; ++x) {
+          const Place place{block.level, {x, y, z}};
+          needed.emplace(key(place), place);
+        }
+      }
+    }
+  }
+  std::vector<Place> places;
+  for (const auto& [number, place] : needed)
+    places.push_back(place);
+  return places;
+}
+
+std::vector<FileBlockSource::Place> FileBlockSource::withNeighbours(const std::vector<Place>& places) const {
+  std::unordered_map<uint64_t, Place> all;
+  for (const Place& place : places) {
+    all.emplace(key(place), place);
+    const glm::ivec3 bricks = brickDims(dims(place.level), file_.brickEdge());
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const int step : {-1, 1}) {
+        Place next = place;
+        next.position[axis] += step;
+        if (next.position[axis] >= 0 && next.position[axis] < bricks[axis]) all.emplace(key(next), next);
+      }
+    }
+  }
+  std::vector<Place> result;
+  for (const auto& [number, place] : all)
+    result.push_back(place);
+  return result;
+}
+
+void FileBlockSource::prepare(std::span<const VisibleBlock> blocks) {
+  ++call_;
+  const std::vector<Place> needed = bricksOf(blocks);
+  const bool shaded = lit() && view_.lighting->shaded();
+  const std::vector<Place> valued = shaded ? withNeighbours(needed) : needed;
+  std::vector<std::pair<Place, Brick*>> withoutValues, withoutAttenuation;
+  bool finest = false;
+  for (const Place& place : valued) {
+    Brick& brick = bricks_[key(place)];
+    brick.lastUsed = call_;
+    if (brick.codes.empty() && brick.matter.empty()) withoutValues.emplace_back(place, &brick);
+    finest = finest || place.level == 0;
+  }
+  for (const Place& place : needed) {
+    Brick& brick = bricks_[key(place)];
+    if (!brick.complete()) withoutAttenuation.emplace_back(place, &brick);
+  }
+  for (const auto& [place, brick] : withoutAttenuation) {
+    if (const auto stored = file_.findLevelBrick(place.level, place.position)) file_.prefetch(place.level, *stored);
+  }
+  if (finest && absent_.empty()) absent_ = absentBrickCodes(file_);
+  FirstException failure;
+  // In two rounds, since shading looks at neighbours' values.
+  const auto readAll = [&](const std::vector<std::pair<Place, Brick*>>& bricks, auto read) {
+#pragma omp parallel for schedule(dynamic, 1)
+    for (int64_t i = 0; i < int64_t(bricks.size()); ++i)
+      failure.guard([&] { (this->*read)(bricks[size_t(i)].first, *bricks[size_t(i)].second); });
+    failure.rethrow();
+  };
+  for (const auto& [place, brick] : withoutValues)
+    held_ -= brick->bytes();
+  readAll(withoutValues, &FileBlockSource::readValues);
+  for (const auto& [place, brick] : withoutValues)
+    held_ += brick->bytes();
+  for (const auto& [place, brick] : withoutAttenuation)
+    held_ -= brick->bytes();
+  readAll(withoutAttenuation, &FileBlockSource::readAttenuation);
+  for (const auto& [place, brick] : withoutAttenuation)
+    held_ += brick->bytes();
+  file_.checkIntact();
+  forget();
+}
+
+void FileBlockSource::forget() {
+  if (held_ <= memoryBytes_) return;
+  std::vector<std::pair<uint64_t, uint64_t>> old;  // when last used, and which
+  for (const auto& [number, brick] : bricks_) {
+    if (brick.lastUsed != call_) old.emplace_back(brick.lastUsed, number);
+  }
+  std::sort(old.begin(), old.end());
+  for (const auto& [used, number] : old) {
+    if (held_ <= memoryBytes_) return;
+    held_ -= bricks_[number].bytes();
+    bricks_.erase(number);
+  }
+}
+
+void FileBlockSource::readValues(const Place& place, Brick& brick) const {
+  const int edge = file_.brickEdge();
+  const auto stored = file_.findLevelBrick(place.level, place.position);
+  if (place.level == 0) {
+    if (!stored) {
+      brick.codes.assign(brickVoxels(), absent_[linearIndex(place.position, brickDims(file_.dims(), edge))]);
+      return;
+    }
+    const BrickView view = file_.brick(*stored, DirectionSet(0));
+    brick.codes.resize(brickVoxels());
+    for (size_t i = 0; i < brick.codes.size(); ++i) {
+      // A damaged file may hold codes beyond the tables made for them.
+      brick.codes[i] = uint16_t(std::min(view.code(view.steps[i]), file_.coding().largest));
+    }
+    return;
+  }
+  brick.matter.assign(brickVoxels(), TableEntry{0.0f, 0.0f, 0.0f, 0.0f});
+  if (!stored) return;
+  const BrickView view = file_.levelBrick(place.level, *stored, DirectionSet(0));
+  for (size_t i = 0; i < brick.matter.size(); ++i) {
+    const size_t step = view.steps[i];
+    const float extinction = glm::unpackHalf1x16(view.matter[3][step]);
+    if (view_.white) {
+      brick.matter[i] = {extinction, extinction, extinction, extinction};
+      continue;
+    }
+    const float perUnit = extinction * (1.0f / 65535.0f);
+    brick.matter[i] = {float(view.matter[0][step]) * perUnit, float(view.matter[1][step]) * perUnit,
+                       float(view.matter[2][step]) * perUnit, extinction};
+  }
+}
+
+void FileBlockSource::readAttenuation(const Place& place, Brick& brick) const {
+  const int edge = file_.brickEdge();
+  const glm::ivec3 origin = place.position * edge;
+  const Level& level = levels_[size_t(place.level)];
+  const auto stored = file_.findLevelBrick(place.level, place.position);
+  brick.attenuations.assign(brickVoxels(), uint16_t(AttenuationGrid::kUnit));
+  std::optional<BrickView> view;
+  if (stored) {
+    DirectionSet directions = level.eye.directions(origin);
+    for (const auto& lamp : level.lamps) {
+      if (lamp) directions |= lamp->directions(origin);
+    }
+    view.emplace(file_.levelBrick(place.level, *stored, directions));
+    std::vector<float> looked(brickVoxels());
+    level.eye.look(*view, looked);
+    for (size_t i = 0; i < looked.size(); ++i)
+      brick.attenuations[i] = uint16_t(looked[view->steps[i]] * AttenuationGrid::kUnit + 0.5f);
+  }
+  if (view_.eye.ratio != nullptr) view_.eye.ratio->correct(origin, glm::ivec3(edge), place.level, brick.attenuations);
+  if (lit()) lightBrick(place, view ? &*view : nullptr, brick);
+}
+
+void FileBlockSource::lightBrick(const Place& place, const BrickView* view, Brick& brick) const {
+  const int edge = file_.brickEdge();
+  const size_t voxels = brickVoxels();
+  brick.lights.assign(voxels, LightValue{0, 0, 0, 0});
+  if (view == nullptr) return;  // nothing is visible there
+  const glm::ivec3 origin = place.position * edge;
+  const double finest = double(1 << place.level);
+  std::vector<glm::dvec3> places(voxels);
+  for (size_t i = 0; i < voxels; ++i)
+    places[i] = glm::dvec3(origin + atIndex(i, edge)) * finest + 0.5 * (finest - 1.0);
+  std::vector<glm::vec3> slopes;
+  if (view_.lighting->shaded()) slopes = gradients(place, brick);
+  std::vector<float> passed(view_.lamps.size() * voxels), looked(voxels);
+  std::vector<uint16_t> corrected(voxels);
+  for (size_t n = 0; n < view_.lamps.size(); ++n) {
+    const auto ofLamp = std::span(passed).subspan(n * voxels, voxels);
+    const LampSource& lamp = view_.lamps[n];
+    if (!lamp.stored) {
+      for (size_t i = 0; i < voxels; ++i) {
+        const glm::ivec3 p = glm::min(glm::ivec3(places[i]), file_.dims() - 1);
+        ofLamp[i] = float(lamp.swept->values[linearIndex(p, file_.dims())]) * (1.0f / AttenuationGrid::kUnit);
+      }
+      continue;
+    }
+    levels_[size_t(place.level)].lamps[n]->look(*view, looked);
+    for (size_t i = 0; i < voxels; ++i)
+      ofLamp[i] = looked[view->steps[i]];
+    if (lamp.stored->ratio == nullptr) continue;
+    for (size_t i = 0; i < voxels; ++i)
+      corrected[i] = uint16_t(ofLamp[i] * AttenuationGrid::kUnit + 0.5f);
+    lamp.stored->ratio->correct(origin, glm::ivec3(edge), place.level, corrected);
+    for (size_t i = 0; i < voxels; ++i)
+      ofLamp[i] = float(corrected[i]) * (1.0f / AttenuationGrid::kUnit);
+  }
+  view_.lighting->light(places, slopes, passed, brick.lights);
+}
+
+std::vector<glm::vec3> FileBlockSource::gradients(const Place& place, const Brick& own) const {
+  const int edge = file_.brickEdge();
+  const glm::ivec3 origin = place.position * edge, last = dims(place.level) - 1;
+  // The bricks on either side of this one.
+  const Brick* beside[3][2] = {};
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int side = 0; side < 2; ++side) {
+      Place next = place;
+      next.position[axis] += 2 * side - 1;
+      const auto found = bricks_.find(key(next));
+      if (next.position[axis] >= 0 && found != bricks_.end()) beside[axis][side] = &found->second;
+    }
+  }
+  const auto value = [&](const Brick& brick, glm::ivec3 local) {
+    const uint64_t i = linearIndex(local, glm::ivec3(edge));
+    return place.level == 0 ? float(brick.codes[i]) : std::min(brick.matter[i].extinction, kOpaqueExtinction);
+  };
+  // A gradient is a covector: it goes with the transposed inverse of the axes. Values as shares of their range.
+  const Placement& placement = file_.placement();
+  const double range = place.level == 0 ? double(file_.coding().largest) : double(kOpaqueExtinction);
+  const glm::mat3 gradientFromIndex(glm::transpose(glm::inverse(glm::dmat3(placement.worldFromIndex()))) *
+                                    (placement.unitLength() / (range * double(1 << place.level))));
+  std::vector<glm::vec3> result(brickVoxels(), glm::vec3(0.0f));
+  for (size_t i = 0; i < result.size(); ++i) {
+    const glm::ivec3 local = atIndex(i, edge), p = origin + local;
+    if (glm::any(glm::greaterThan(p, last))) continue;
+    glm::vec3 difference(0.0f);
+    for (int axis = 0; axis < 3; ++axis) {
+      const int low = std::max(p[axis] - 1, 0), high = std::min(p[axis] + 1, last[axis]);
+      if (low == high) continue;
+      const auto at = [&](int position) {
+        glm::ivec3 there = local;
+        there[axis] = position - origin[axis];
+        const Brick* brick = &own;
+        if (there[axis] < 0) brick = beside[axis][0];
+        if (there[axis] >= edge) brick = beside[axis][1];
+        there[axis] = (there[axis] + edge) % edge;
+        return value(*brick, there);
+      };
+      difference[axis] = (at(high) - at(low)) / float(high - low);
+    }
+    result[i] = gradientFromIndex * difference;
+  }
+  return result;
+}
+
+void FileBlockSource::gather(const VisibleBlock& block, BlockSamples& samples) const {
+  const int edge = file_.brickEdge(), side = blockSide(edge_);
+  const int shift = std::countr_zero(unsigned(edge)), mask = edge - 1;
+  const glm::ivec3 last = dims(block.level) - 1;
+  const glm::ivec3 low = glm::clamp(block.origin - 1, glm::ivec3(0), last) / edge;
+  const glm::ivec3 high = glm::clamp(block.origin + edge_ + 1, glm::ivec3(0), last) / edge;
+  const glm::ivec3 count = high - low + 1;
+  std::vector<const Brick*> bricks(voxelCount(count));
+  for (size_t i = 0; i < bricks.size(); ++i) {
+    const glm::ivec3 at(int(i) % count.x, int(i) / count.x % count.y, int(i) / (count.x * count.y));
+    bricks[i] = &brick({block.level, low + at});
+  }
+  const size_t voxels = blockVoxels(edge_);
+  samples.codes.resize(block.level == 0 ? voxels : 0);
+  samples.matter.resize(block.level == 0 ? 0 : voxels);
+  samples.attenuations.resize(voxels);
+  samples.lights.resize(lit() ? voxels : 0);
+  size_t to = 0;
+  for (int z = 0; z < side; ++z) {
+    const int pz = std::clamp(block.origin.z - 1 + z, 0, last.z);
+    for (int y = 0; y < side; ++y) {
+      const int py = std::clamp(block.origin.y - 1 + y, 0, last.y);
+      const size_t rowBricks = size_t(count.x) * size_t(((py >> shift) - low.y) + count.y * ((pz >> shift) - low.z));
+      const size_t row = size_t(edge) * size_t((py & mask) + edge * (pz & mask));
+      for (int x = 0; x < side; ++x, ++to) {
+        const int px = std::clamp(block.origin.x - 1 + x, 0, last.x);
+        const Brick& from = *bricks[rowBricks + size_t((px >> shift) - low.x)];
+        const size_t at = row + size_t(px & mask);
+        samples.attenuations[to] = from.attenuations[at];
+        if (block.level == 0) {
+          samples.codes[to] = from.codes[at];
+        } else {
+          samples.matter[to] = from.matter[at];
+        }
+        if (lit()) samples.lights[to] = from.lights[at];
+      }
+    }
+  }
+  AttenuationGrid faces;
+  faces.setOpenFaces(view_.eye.towards, file_.dims());
+  openApron(faces.openLow, faces.openHigh, dims(block.level), block.origin, edge_, samples.attenuations);
+}
+
+}  // namespace freevoxel

@@ -1,0 +1,205 @@
+// Cuts through the hierarchy: no seams, the same bits whatever is in memory, and what is left out adds nothing.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <glm/glm.hpp>
+
+#include "base/compare.h"
+#include "base/error.h"
+#include "splat/cell_block.h"
+#include "splat/level_selection.h"
+#include "splat/pixel_rays.h"
+#include "tests/splat/scene.h"
+
+namespace freevoxel {
+namespace {
+
+using namespace test;
+
+bool sameSums(const SplatResult& a, const SplatResult& b) {
+  return a.sums.quantum == b.sums.quantum && a.sums.image.size == b.sums.image.size &&
+         std::memcmp(a.sums.image.pixels.data(), b.sums.image.pixels.data(),
+                     a.sums.image.pixels.size() * sizeof(float)) == 0;
+}
+
+/// Longer than it is wide, so that a near end and a far one differ in level.
+Scene uniformBox() {
+  return makeScene(makeVolume({41, 37, 150}, {1.0, 1.2, 0.9}, [](int, int, int) { return 200; }),
+                   uniformOpacity(0.02, {0.9, 0.5, 0.2}), 8, Classification::preintegrated);
+}
+
+Scene lumps() {
+  TransferFunction transfer;
+  transfer.points = {{0.0, glm::dvec3(0.1, 0.2, 1.0), 0.0},
+                     {120.0, glm::dvec3(0.2, 0.9, 0.3), 0.0},
+                     {140.0, glm::dvec3(0.2, 0.9, 0.3), 0.05},
+                     {255.0, glm::dvec3(1.0, 0.4, 0.1), 0.6}};
+  return makeScene(makeVolume({45, 37, 100}, {1.0, 0.7, 1.1},
+                              [](int x, int y, int z) {
+                                return int(127.5 + 60.0 * std::sin(0.3 * x) + 40.0 * std::cos(0.4 * y + 0.2 * z) +
+                                           27.0 * std::sin(0.5 * z - 0.1 * x));
+                              }),
+                   transfer, 8, Classification::preintegrated);
+}
+
+/// Along the box's long side, from close by.
+Camera alongView(const Scene& scene, glm::ivec2 imageSize) {
+  const Box box = scene.bounds();
+  Camera camera;
+  camera.target = 0.5 * (box.lower + box.upper);
+  camera.eye = {camera.target.x + 18.0, camera.target.y + 14.0, box.upper.z + 22.0};
+  camera.verticalFov = 0.9;
+  camera.imageSize = imageSize;
+  return camera;
+}
+
+int levelsDrawn(const SplatStatistics& statistics) {
+  int count = 0;
+  for (const uint64_t blocks : statistics.blocksOfLevel)
+    count += blocks > 0 ? 1 : 0;
+  return count;
+}
+
+TEST(Levels, MixedCutOfAUniformBoxIsBeerLambert) {
+  const Scene scene = uniformBox();
+  const Camera camera = alongView(scene, {83, 61});
+  SplatOptions options;
+  options.lodPixels = 2.5;
+  const SplatResult result = splatScene(scene, camera, options);
+  ASSERT_GE(levelsDrawn(result.statistics), 2);
+  const Image picture = resolve(result.sums, Formula::normalised);
+  const std::vector<PixelRay> rays = pixelRays(scene.volume.header.placement, scene.volume.header.dims, camera);
+  const glm::vec3 colour = scene.transfer.at(200.0).linear;
+  const double extinction = scene.transfer.extinctionAt(200.0);
+  int covered = 0;
+  for (size_t i = 0; i < rays.size(); ++i) {
+    const double length = std::max(0.0f, rays[i].sHigh - rays[i].sLow) * double(rays[i].lengthPerPlane);
+    const double alpha = 1.0 - std::exp(-extinction * length);
+    covered += alpha > 0.01 ? 1 : 0;
+    ASSERT_NEAR(picture.pixels[i * 4 + 3], alpha, 1.0 / 255.0) << i;
+    ASSERT_NEAR(picture.pixels[i * 4], colour.r * alpha, 1.0 / 255.0) << i;
+  }
+  EXPECT_GT(covered, 1000);
+}
+
+TEST(Levels, CutTilesTheVolumeAndIsFinerNearTheEye) {
+  const Scene scene = uniformBox();
+  const Camera camera = alongView(scene, {83, 61});
+  Splatter splatter(*scene.file, scene.transfer, Backend::cpu, 16);
+  SplatOptions options;
+  options.lodPixels = 2.5;
+  splatter.prepare(camera, options);
+  const glm::ivec3 dims = scene.volume.header.dims;
+  std::vector<int> owners(voxelCount(dims), 0);
+  const VolumeView view = volumeView(scene.volume.header.placement, camera);
+  for (const VisibleBlock& block : splatter.blocks()) {
+    const int voxels = 1 << block.level;
+    const glm::ivec3 first = block.origin * voxels, last = glm::min(first + 16 * voxels, dims);
+    for (int z = first.z; z < last.z; ++z) {
+      for (int y = first.y; y < last.y; ++y) {
+        for (int x = first.x; x < last.x; ++x)
+          ++owners[linearIndex({x, y, z}, dims)];
+      }
+    }
+    const bool shown = !pixelBounds(view, block).empty();
+    if (shown && block.level > 0) {
+      EXPECT_LE(largestVoxel(block, 16, view), 2.5);
+    }
+  }
+  EXPECT_EQ(std::count(owners.begin(), owners.end(), 1), int64_t(owners.size()));
+}
+
+// Kernels keep their mass whatever their level.
+TEST(Levels, KernelsOfAMixedCutHaveTheDepthOfTheFinest) {
+  const Scene scene = uniformBox();
+  const Camera camera = alongView(scene, {83, 61});
+  SplatOptions options = kKernel;
+  const Image finest = resolve(splatScene(scene, camera, options).sums, Formula::normalised);
+  options.lodPixels = 2.5;
+  const SplatResult result = splatScene(scene, camera, options);
+  ASSERT_GE(levelsDrawn(result.statistics), 2);
+  // Wider kernels swell the box's outline; where they meet others of another size, their weights ripple by a few per
+  // cent of the extinction of a voxel.
+  EXPECT_GE(compareImages(resolve(result.sums, Formula::normalised), finest).psnr, 24.0);
+}
+
+TEST(Levels, SameBitsWhateverTheOrderBackendAndMemory) {
+  const Scene scene = lumps();
+  const Camera camera = alongView(scene, {64, 47});
+  for (const Footprint footprint : {Footprint::cell, Footprint::kernel}) {
+    for (const double lod : {0.0, 2.5}) {
+      SplatOptions options;
+      options.footprint = footprint;
+      options.lodPixels = lod;
+      options.lighting.ambient = 0.2f;
+      options.lighting.shading = Shading::phong;
+      options.lighting.lights = {{true, {1.0, 2.0, 1.0}, {1.0f, 0.8f, 0.5f}}};
+      const SplatResult first = splatScene(scene, camera, options);
+      EXPECT_EQ(levelsDrawn(first.statistics), lod > 0.0 ? levelsDrawn(first.statistics) : 1);
+      if (lod > 0.0) {
+        EXPECT_GE(levelsDrawn(first.statistics), 2);
+      }
+      for (const Backend backend : {Backend::cpu, Backend::gl}) {
+        Splatter fromFile(*scene.file, scene.transfer, backend);
+        options.order = {SplatOrder::Kind::shuffle, 3};
+        options.memoryBytes = 0;
+        options.gpuMemoryBytes = 0;
+        EXPECT_TRUE(sameSums(fromFile.render(camera, options, silentProgress()), first));
+        options.memoryBytes = uint64_t(24) << 20;
+        options.gpuMemoryBytes = uint64_t(8) << 20;
+        const SplatResult bounded = fromFile.render(camera, options, silentProgress());
+        EXPECT_TRUE(sameSums(bounded, first)) << int(backend);
+        EXPECT_LE(bounded.statistics.glBytes, options.gpuMemoryBytes);
+        if (backend == Backend::gl) {
+          EXPECT_GT(bounded.statistics.glBytes, 0u);
+        }
+      }
+    }
+  }
+}
+
+TEST(Levels, TooLittleMemoryIsAnError) {
+  const Scene scene = lumps();
+  const Camera camera = alongView(scene, {64, 47});
+  SplatOptions options;
+  options.memoryBytes = 1000;
+  EXPECT_THROW(splatScene(scene, camera, options), MachineError);
+  options.memoryBytes = 0;
+  options.gpuMemoryBytes = uint64_t(1) << 19;
+  EXPECT_THROW(splatScene(scene, camera, options, Backend::gl), MachineError);
+}
+
+TEST(Levels, SweptAttenuationAndOtherColoursAreRefused) {
+  const Scene scene = lumps();
+  const Camera camera = alongView(scene, {64, 47});
+  SplatOptions options;
+  options.lodPixels = 1.0;
+  options.attenuation = AttenuationSource::swept;
+  EXPECT_THROW(splatScene(scene, camera, options), InputError);
+  options.attenuation = AttenuationSource::stored;
+  TransferFunction recoloured = scene.transfer;
+  recoloured.points[1].srgb = {0.3, 0.3, 0.4};
+  Splatter splatter(*scene.file, recoloured, Backend::cpu);
+  EXPECT_THROW(splatter.render(camera, options, silentProgress()), InputError);
+}
+
+TEST(Cull, WhatAddsNothingIsLeftOutWithoutChangingABit) {
+  const Scene scene = lumps();
+  // So close that much of the volume is off the image.
+  Camera camera = alongView(scene, {40, 31});
+  camera.verticalFov = 0.15;
+  for (const double lod : {0.0, 2.5}) {
+    SplatOptions options;
+    options.lodPixels = lod;
+    const SplatResult culled = splatScene(scene, camera, options);
+    options.cull = Cull::off;
+    const SplatResult all = splatScene(scene, camera, options);
+    EXPECT_TRUE(sameSums(culled, all));
+    EXPECT_GT(culled.statistics.culledBlocks + culled.statistics.emptyBlocks, 0u);
+    EXPECT_GT(all.statistics.blocks, culled.statistics.blocks);
+  }
+}
+
+}  // namespace
+}  // namespace freevoxel
