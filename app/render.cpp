@@ -212,7 +212,7 @@ void drawSplats(const ValueGrid* grid, const AttenuationFile* file, TransferFunc
   expectSameOnAllRanks(session.ranks(),
                        file != nullptr ? file->identity() : contentHash(std::as_bytes(std::span(grid->codes))),
                        options.input);
-  if (options.share.colourByRank) {
+  if (options.share.colourBy != ColourBy::value) {
     for (TransferPoint& point : transfer.points)
       point.srgb = glm::dvec3(1.0);
   }
@@ -380,8 +380,10 @@ Command addRender(CLI::App& program, CommonOptions& common) {
                         "order of splats; the bits are the same (default hilbert)", parseOrder);
   command->add_option("--sums", options->sums, "write the six sums of every pixel: R G B O DepthHigh DepthLow")
       ->type_name("FILE.exr");
-  addChoice<bool>(*command, "--colour-by", options->share.colourByRank, {{"value", false}, {"rank", true}},
-                  "the transfer function's colours, or one for every process: what it drew");
+  addChoice<ColourBy>(
+      *command, "--colour-by", options->share.colourBy,
+      {{"value", ColourBy::value}, {"rank", ColourBy::rank}, {"level", ColourBy::level}},
+      "the transfer function's colours, or one for every process: what it drew, or one for every level");
   addParsed<int>(*command, "--frames", options->frames, "N",
                  fmt::format("a turntable: N pictures, 1 to {}, of a full turn about y, named NAME_0000.png and so on",
                              kMostFrames),

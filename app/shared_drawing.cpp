@@ -29,6 +29,13 @@ void tint(Sums& sums, glm::vec3 linear) {
   }
 }
 
+glm::vec3 linearColour(int number) {
+  glm::vec3 linear(0.0f);
+  for (int c = 0; c < 3; ++c)
+    linear[c] = linearFromSrgb(float(rankColour(number)[c]));
+  return linear;
+}
+
 std::string hostName() {
   std::array<char, 256> name{};
   gethostname(name.data(), name.size() - 1);
@@ -99,6 +106,48 @@ SharedDrawing::SharedDrawing(Splatter& splatter, const ShareOptions& options, gl
       session_(session),
       compositor_(session.ranks(), imageSize, kSumChannels) {}
 
+Sums SharedDrawing::drawByLevel(float quantum, const std::vector<uint8_t>& share, SplatStatistics& statistics) {
+  const std::span<const VisibleBlock> blocks = splatter_.blocks();
+  int levels = 1;
+  for (const VisibleBlock& block : blocks)
+    levels = std::max(levels, block.level + 1);
+  Sums sum;
+  for (int level = 0; level < levels; ++level) {
+    std::vector<uint8_t> ofLevel(blocks.size(), 0);
+    for (size_t i = 0; i < blocks.size(); ++i)
+      ofLevel[i] = blocks[i].level == level && (share.empty() || share[i] != 0) ? 1 : 0;
+    Sums sums = splatter_.draw(quantum, ofLevel, session_.progress());
+    tint(sums, linearColour(level));
+    const SplatStatistics before = statistics;
+    statistics = splatter_.statistics();
+    statistics.passes = 1;
+    statistics.blocks += before.blocks;
+    statistics.culledBlocks += before.culledBlocks;
+    statistics.hiddenBlocks += before.hiddenBlocks;
+    statistics.emptyBlocks += before.emptyBlocks;
+    statistics.splats += before.splats;
+    statistics.culledSplats += before.culledSplats;
+    statistics.hiddenSplats += before.hiddenSplats;
+    statistics.fragments += before.fragments;
+    statistics.pieces += before.pieces;
+    const auto addLevels = [](std::vector<uint64_t>& to, const std::vector<uint64_t>& from) {
+      to.resize(std::max(to.size(), from.size()));
+      for (size_t i = 0; i < from.size(); ++i)
+        to[i] += from[i];
+    };
+    addLevels(statistics.blocksOfLevel, before.blocksOfLevel);
+    addLevels(statistics.splatsOfLevel, before.splatsOfLevel);
+    if (level == 0) {
+      sum = std::move(sums);
+    } else {
+      // Whole quanta: exact wherever the result is, which is checked.
+      for (size_t i = 0; i < sum.image.pixels.size(); ++i)
+        sum.image.pixels[i] += sums.image.pixels[i];
+    }
+  }
+  return sum;
+}
+
 SplatResult SharedDrawing::render(const Camera& camera, const SplatOptions& options) {
   const Ranks& ranks = session_.ranks();
   splatter_.prepare(camera, options);
@@ -107,15 +156,16 @@ SplatResult SharedDrawing::render(const Camera& camera, const SplatOptions& opti
   if (ranks.rankCount() > 1) {
     share = shareOf(dealBlocks(sharedBlocks(splatter_.blocks()), options_.partition, ranks.rankCount()), ranks.rank());
   }
-  const std::array<float, 3> colour = [&] {
-    std::array<float, 3> linear{};
-    for (int c = 0; c < 3; ++c)
-      linear[size_t(c)] = linearFromSrgb(float(rankColour(ranks.rank())[c]));
-    return linear;
-  }();
   for (float quantum = options.firstQuantum;; quantum = nextQuantum(quantum)) {
-    Sums sums = splatter_.draw(quantum, share, session_.progress());
-    if (options_.colourByRank) tint(sums, {colour[0], colour[1], colour[2]});
+    SplatStatistics done;
+    Sums sums;
+    if (options_.colourBy == ColourBy::level) {
+      sums = drawByLevel(quantum, share, done);
+    } else {
+      sums = splatter_.draw(quantum, share, session_.progress());
+      done = splatter_.statistics();
+    }
+    if (options_.colourBy == ColourBy::rank) tint(sums, linearColour(ranks.rank()));
     ranks.agree();
     const auto start = std::chrono::steady_clock::now();
     const std::array<float, kSumChannels> limits = exactLimits(quantum);
@@ -124,7 +174,6 @@ SplatResult SharedDrawing::render(const Camera& camera, const SplatOptions& opti
     if (options_.composite == CompositeMethod::reduce) reducedBytes_ += sums.image.pixels.size() * sizeof(float);
     compositeSeconds_ += secondsSince(start);
     if (!exact) continue;
-    const SplatStatistics& done = splatter_.statistics();
     total_.blocks += done.blocks;
     total_.splats += done.splats;
     total_.fragments += done.fragments;

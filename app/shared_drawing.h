@@ -17,17 +17,24 @@ namespace freevoxel {
 /// How pictures of several ranks become one. The bits are the same.
 enum class CompositeMethod { tiles, reduce };
 
+/// What matter is coloured by (papers/freevoxels Figs. 3 and 5).
+enum class ColourBy {
+  value,  ///< the transfer function
+  rank,   ///< that drew it
+  level,  ///< of the block it was drawn from
+};
+
 struct ShareOptions {
   Partition partition;
   CompositeMethod composite = CompositeMethod::tiles;
-  bool colourByRank = false;  ///< everything in the colour of the rank that drew it (papers/freevoxels Fig. 5)
+  ColourBy colourBy = ColourBy::value;
 };
 /// Throws UsageError.
 Partition parsePartitionName(std::string_view text);
 /// --partition and --composite.
 void addShareOptions(CLI::App& command, ShareOptions& options);
 
-/// Colour of a rank, sRGB: neighbours far apart in hue.
+/// Colour of a rank or level, sRGB: neighbours far apart in hue.
 glm::dvec3 rankColour(int rank);
 
 /// What the ranks share out, from the blocks that a splatter has.
@@ -47,6 +54,9 @@ class SharedDrawing {
   void report();
 
  private:
+  /// Blocks of every level in a colour of their own.
+  Sums drawByLevel(float quantum, const std::vector<uint8_t>& share, SplatStatistics& statistics);
+
   Splatter& splatter_;
   const ShareOptions& options_;
   Session& session_;

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Draws the FreeVoxels paper's Figures 2, 4, 6 and 7 and measures the tables of docs/fidelity.md, into docs/results:
-#   scripts/reproduce_freevoxels.sh [figures] [quality] [shadows] [inside] [hidden] [lights]
+# Draws the FreeVoxels paper's Figures 2 to 7 and measures the tables of docs/fidelity.md and docs/results/hierarchy, into
+# docs/results:
+#   scripts/reproduce_freevoxels.sh [figures] [quality] [shadows] [inside] [hidden] [lights] [levels]
 # All of them unless some are named. Builds the release preset if need be. DATA is the folder with the real volumes
 # (default ../shared/data; without it those columns are left out); references are kept in CACHE (default
 # build/references) and cast only once; VIEWS and SIZE make everything quicker (defaults 20 and 512).
@@ -13,7 +14,7 @@ size=${SIZE:-512}
 out=${OUT:-docs/results/freevoxels}
 build=${BUILD:-build/release}
 wanted=("$@")
-[ ${#wanted[@]} -gt 0 ] || wanted=(figures quality shadows inside hidden lights)
+[ ${#wanted[@]} -gt 0 ] || wanted=(figures quality shadows inside hidden lights levels)
 
 if [ ! -x "$build/bin/freevoxel_fidelity" ]; then
   cmake --preset release -DFREEVOXEL_BENCH=ON
@@ -60,6 +61,20 @@ figures() {
     "$program" render "$head" "${view[@]}" --light-direction=-1,-0.7,-0.6,1,0.3,0.1 \
       --light-direction=1,-0.5,-0.4,0.1,0.35,1 -o "$scratch/two.png"
     "$program" sheet "$scratch"/{red,white,two}.png --columns 3 -o "$out/figure7.png" --quiet
+
+    # Close to the face, so that blocks of several levels are needed.
+    "$program" precompute "$head" "${view[@]:0:8}" --transfer examples/transfer/cthead.json --layout compact --levels 0 \
+      -o "$scratch/head.fvx" --quiet
+    local -a near=("$scratch/head.fvx" --eye 100,-60,60 --target 127,127,112 --up 0,0,-1 --fov 60 --size 400x400 --quiet)
+    "$program" render "${near[@]}" -o "$scratch/finest.png"
+    "$program" render "${near[@]}" --lod 2 -o "$scratch/cut.png"
+    "$program" render "${near[@]}" --lod 2 --colour-by level -o "$scratch/levels.png"
+    "$program" sheet "$scratch"/{finest,cut,levels}.png --columns 3 -o "$out/figure3.png" --quiet
+    if command -v mpirun > /dev/null; then
+      OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 LP_NUM_THREADS=1 mpirun --oversubscribe -n 4 \
+        "$program" render "${near[@]}" --lod 2 --colour-by rank --threads 1 -o "$scratch/ranks.png"
+      "$program" sheet "$scratch"/{levels,ranks}.png --columns 2 -o "$out/figure5.png" --quiet
+    fi
   fi
   rm -r "$scratch"
 }
@@ -69,8 +84,12 @@ for what in "${wanted[@]}"; do
     figures) figures ;;
     quality | shadows | hidden) "${fidelity[@]}" "$what" -o "$out/$what.md" ;;
     inside) "${fidelity[@]}" inside --columns cloud,cthead -o "$out/inside.md" ;;
+    levels)
+      mkdir -p docs/results/hierarchy
+      "$build/bin/freevoxel_hierarchy" --data "$data" --transfers examples/transfer --cache "$cache" --views "$views" \
+        --columns cloud,shells,carp,cthead,cthead-coloured -o docs/results/hierarchy/levels.md ;;
     lights) "${fidelity[@]}" lights --columns cloud,cthead,embryo -o "$out/lights.md" ;;
-    *) echo "expected figures, quality, shadows, inside, hidden or lights, found '$what'" >&2; exit 2 ;;
+    *) echo "expected figures, quality, shadows, inside, hidden, lights or levels, found '$what'" >&2; exit 2 ;;
   esac
 done
 echo "results: $out"
