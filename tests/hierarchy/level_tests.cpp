@@ -168,7 +168,8 @@ TEST_P(LevelFile, StandsForTheFinestLevel) {
         for (size_t k = 0; k < means.size(); ++k) {
           const double expected =
               GetParam().hierarchy == Hierarchy::geometric ? std::exp2(-coarseMeans[k][i]) : coarseMeans[k][i];
-          // The bytes that this starts from are half a code off, on the way up up to another half, and so is the result.
+          // The bytes that this starts from are half a code off, on the way up up to another half, and so is the
+          // result.
           ASSERT_NEAR(brick.attenuations[k][step], 255.0 * expected, 1.51) << "level " << level << ", direction " << k;
         }
       }
