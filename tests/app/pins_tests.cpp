@@ -10,17 +10,17 @@
 namespace freevoxel::test {
 namespace {
 
-constexpr const char* kTransfer =
+constexpr const char* kPinsTransfer =
     R"({"range": [0, 255], "points": [{"value": 0, "color": [0, 0, 1], "opacity": 0},
         {"value": 255, "color": [1, 1, 0], "opacity": 0.7}]})";
 constexpr const char* kPins = " --pin-light 9,8,7 --pin-direction=-1,0.5,0.25 --pin-light 3,-4,0 ";
-constexpr const char* kView = " --size 41x33 --eye 9,8,7 --light-direction=-2,1,0.5 --light 3,-4,0,1,0.2,0.1 ";
+constexpr const char* kPinsView = " --size 41x33 --eye 9,8,7 --light-direction=-2,1,0.5 --light 3,-4,0,1,0.2,0.1 ";
 
 class Pins : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder = temporaryFolder();
-    writeBytes(folder + "/t.json", kTransfer);
+    writeBytes(folder + "/t.json", kPinsTransfer);
     run("generate cloud --dims 7,5,11 --spacing 0.3,1.1,0.7 -o cloud.nrrd");
     run("precompute cloud.nrrd --transfer t.json -o plain.fvx");
   }
@@ -30,7 +30,7 @@ class Pins : public ::testing::Test {
 };
 
 TEST_F(Pins, giveThePictureOfSweepsInBothLayouts) {
-  run(std::string("render plain.fvx --attenuation swept --light-attenuation swept -o swept.exr") + kView);
+  run(std::string("render plain.fvx --attenuation swept --light-attenuation swept -o swept.exr") + kPinsView);
   for (const std::string layout : {"dense", "compact"}) {
     run("precompute cloud.nrrd --transfer t.json --layout " + layout + kPins + "-o pinned.fvx --stats made.json");
     run("verify pinned.fvx");
@@ -44,7 +44,7 @@ TEST_F(Pins, giveThePictureOfSweepsInBothLayouts) {
     EXPECT_EQ(made["pins"], 3);
     EXPECT_EQ(made["fileBytes"], readBytes(folder + "/pinned.fvx").size());
     for (const std::string source : {"", "--attenuation pinned --light-attenuation pinned "}) {
-      run("render pinned.fvx " + source + "--stats drawn.json -o pinned.exr" + kView);
+      run("render pinned.fvx " + source + "--stats drawn.json -o pinned.exr" + kPinsView);
       run("compare swept.exr pinned.exr --identical");
       const auto drawn = nlohmann::json::parse(readBytes(folder + "/drawn.json"));
       EXPECT_EQ(drawn["attenuation"], "pinned");
