@@ -100,7 +100,6 @@ class FileBlockSource final : public BlockSource {
   int edge_;
   uint64_t memoryBytes_;
   std::vector<Level> levels_;
-  float perLargestExtinction_ = 1.0f;
   std::unordered_map<uint64_t, Brick> bricks_;
   uint64_t held_ = 0;  ///< bytes of bricks_
   uint64_t call_ = 0;  ///< of prepare()
