@@ -121,22 +121,7 @@ Sums SharedDrawing::drawByLevel(float quantum, const std::vector<uint8_t>& share
     const SplatStatistics before = statistics;
     statistics = splatter_.statistics();
     statistics.passes = 1;
-    statistics.blocks += before.blocks;
-    statistics.culledBlocks += before.culledBlocks;
-    statistics.hiddenBlocks += before.hiddenBlocks;
-    statistics.emptyBlocks += before.emptyBlocks;
-    statistics.splats += before.splats;
-    statistics.culledSplats += before.culledSplats;
-    statistics.hiddenSplats += before.hiddenSplats;
-    statistics.fragments += before.fragments;
-    statistics.pieces += before.pieces;
-    const auto addLevels = [](std::vector<uint64_t>& to, const std::vector<uint64_t>& from) {
-      to.resize(std::max(to.size(), from.size()));
-      for (size_t i = 0; i < from.size(); ++i)
-        to[i] += from[i];
-    };
-    addLevels(statistics.blocksOfLevel, before.blocksOfLevel);
-    addLevels(statistics.splatsOfLevel, before.splatsOfLevel);
+    statistics.addCounts(before);
     if (level == 0) {
       sum = std::move(sums);
     } else {
@@ -174,10 +159,7 @@ SplatResult SharedDrawing::render(const Camera& camera, const SplatOptions& opti
     if (options_.composite == CompositeMethod::reduce) reducedBytes_ += sums.image.pixels.size() * sizeof(float);
     compositeSeconds_ += secondsSince(start);
     if (!exact) continue;
-    total_.blocks += done.blocks;
-    total_.splats += done.splats;
-    total_.fragments += done.fragments;
-    total_.pieces += done.pieces;
+    total_.addCounts(done);
     total_.attenuationSeconds += done.attenuationSeconds;
     total_.lightSeconds += done.lightSeconds;
     total_.setupSeconds += done.setupSeconds;

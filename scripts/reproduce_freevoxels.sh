@@ -62,17 +62,17 @@ figures() {
       --light-direction=1,-0.5,-0.4,0.1,0.35,1 -o "$scratch/two.png"
     "$program" sheet "$scratch"/{red,white,two}.png --columns 3 -o "$out/figure7.png" --quiet
 
-    # Close to the face, so that blocks of several levels are needed.
+    # Close to the head, so that blocks of several levels are needed.
     "$program" precompute "$head" "${view[@]:0:8}" --transfer examples/transfer/cthead.json --layout compact --levels 0 \
       -o "$scratch/head.fvx" --quiet
-    local -a near=("$scratch/head.fvx" --eye 100,-60,60 --target 127,127,112 --up 0,0,-1 --fov 60 --size 400x400 --quiet)
+    local -a near=("$scratch/head.fvx" --eye=-30,-60,60 --target 140,127,112 --up 0,0,-1 --fov 60 --size 400x400 --quiet)
     "$program" render "${near[@]}" -o "$scratch/finest.png"
-    "$program" render "${near[@]}" --lod 2 -o "$scratch/cut.png"
-    "$program" render "${near[@]}" --lod 2 --colour-by level -o "$scratch/levels.png"
+    "$program" render "${near[@]}" --lod 12 -o "$scratch/cut.png"
+    "$program" render "${near[@]}" --lod 12 --colour-by level -o "$scratch/levels.png"
     "$program" sheet "$scratch"/{finest,cut,levels}.png --columns 3 -o "$out/figure3.png" --quiet
     if command -v mpirun > /dev/null; then
       OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1 LP_NUM_THREADS=1 mpirun --oversubscribe -n 4 \
-        "$program" render "${near[@]}" --lod 2 --colour-by rank --threads 1 -o "$scratch/ranks.png"
+        "$program" render "${near[@]}" --lod 12 --colour-by rank --threads 1 -o "$scratch/ranks.png"
       "$program" sheet "$scratch"/{levels,ranks}.png --columns 2 -o "$out/figure5.png" --quiet
     fi
   fi

@@ -54,6 +54,25 @@ StoredLookup lookupOf(AttenuationSource source) {
 
 }  // namespace
 
+void SplatStatistics::addCounts(const SplatStatistics& other) {
+  blocks += other.blocks;
+  culledBlocks += other.culledBlocks;
+  hiddenBlocks += other.hiddenBlocks;
+  emptyBlocks += other.emptyBlocks;
+  splats += other.splats;
+  culledSplats += other.culledSplats;
+  hiddenSplats += other.hiddenSplats;
+  fragments += other.fragments;
+  pieces += other.pieces;
+  const auto addLevels = [](std::vector<uint64_t>& to, const std::vector<uint64_t>& from) {
+    to.resize(std::max(to.size(), from.size()));
+    for (size_t i = 0; i < from.size(); ++i)
+      to[i] += from[i];
+  };
+  addLevels(blocksOfLevel, other.blocksOfLevel);
+  addLevels(splatsOfLevel, other.splatsOfLevel);
+}
+
 std::string_view attenuationSourceName(AttenuationSource source) {
   switch (source) {
     case AttenuationSource::automatic:

@@ -88,6 +88,9 @@ struct SplatStatistics {
   std::string lightAttenuation;  ///< the same towards lamps, of the last one; empty without any
   uint64_t glBytes = 0;          ///< most that buffers and textures took at once
   double attenuationSeconds = 0, lightSeconds = 0, setupSeconds = 0, drawSeconds = 0;
+
+  /// Adds what another drawing counted, of blocks, splats, fragments and pieces.
+  void addCounts(const SplatStatistics& other);
 };
 
 struct SplatResult {
