@@ -33,6 +33,8 @@ uint64_t bytesPerTexel(GLenum format) {
       return 16;
     case GL_RG32F:
       return 8;
+    case GL_R32F:
+      return 4;
     default:
       throw InternalError("internal error: a texture format of unknown size");
   }
