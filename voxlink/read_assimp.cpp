@@ -1,5 +1,6 @@
 #include "voxlink/read_assimp.h"
 
+#include <assimp/BaseImporter.h>
 #include <assimp/GltfMaterial.h>
 #include <assimp/importerdesc.h>
 #include <assimp/postprocess.h>
@@ -13,6 +14,7 @@
 #include <filesystem>
 #include <glm/mat4x4.hpp>
 #include <glm/matrix.hpp>
+#include <memory>
 #include <set>
 
 #include "base/error.h"
@@ -97,7 +99,9 @@ void keepOnly(Assimp::Importer& importer, const std::string& extension) {
   for (size_t i = importer.GetImporterCount(); i-- > 0;) {
     const std::vector<std::string_view> extensions = words(importer.GetImporterInfo(i)->mFileExtensions);
     if (std::find(extensions.begin(), extensions.end(), extension) == extensions.end()) {
-      importer.UnregisterLoader(importer.GetImporter(i));
+      // What is no longer registered is no longer the importer's to delete.
+      const std::unique_ptr<Assimp::BaseImporter> loader(importer.GetImporter(i));
+      importer.UnregisterLoader(loader.get());
     }
   }
 }
