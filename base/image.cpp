@@ -1,6 +1,5 @@
 #include "base/image.h"
 
-#include <OpenImageIO/imageio.h>
 #include <zlib.h>
 
 #include <algorithm>
@@ -13,13 +12,12 @@
 
 #include "base/atomic_file.h"
 #include "base/error.h"
+#include "base/image_library.h"
 #include "base/mapped_file.h"
 
 namespace freevoxel {
 
 namespace {
-
-namespace oiio = OIIO;
 
 constexpr int kMaxImageSize = 32768;  // as in checkCamera
 constexpr int kMaxChannels = 64;
@@ -29,21 +27,6 @@ constexpr uint64_t kMaxCompression = 4096;
 
 /// EXR files keep their channels sorted by name; this attribute remembers the order they were given in.
 constexpr const char* kChannelOrder = "ChannelOrder";
-
-void quietOpenImageIo() {
-  // Its thread pools would compete with ours and, started inside a library call, outlive it. -1 means none at all.
-  [[maybe_unused]] static const bool once = [] {
-    oiio::attribute("threads", 1);
-    oiio::attribute("exr_threads", -1);
-    return true;
-  }();
-}
-
-/// The library's messages run over several lines; ours have one.
-std::string firstLine(std::string text) {
-  text.erase(std::find(text.begin(), text.end(), '\n'), text.end());
-  return text.empty() ? "unknown reason" : text;
-}
 
 constexpr std::array<uint8_t, 8> kPngSignature{0x89, 'P', 'N', 'G', '\r', '\n', 0x1a, '\n'};
 constexpr std::array<uint8_t, 4> kExrSignature{0x76, 0x2f, 0x31, 0x01};
@@ -94,45 +77,40 @@ const char* checkedFormat(const std::string& path) {
 
 /// An image file opened for reading, its header checked.
 struct OpenedImage {
-  std::unique_ptr<oiio::ImageInput> input;
-  oiio::ImageSpec spec;
+  std::unique_ptr<ImageFileReader> file;
   std::string format;
 };
 
 OpenedImage openImage(const std::string& path) {
-  quietOpenImageIo();
   OpenedImage opened;
   opened.format = checkedFormat(path);
-  opened.input = oiio::ImageInput::create(opened.format);
-  if (!opened.input) throw InternalError("OpenImageIO has no reader for " + opened.format);
-  oiio::ImageSpec wishes;
-  wishes["oiio:UnassociatedAlpha"] = 1;
-  if (!opened.input->open(path, opened.spec, wishes)) {
-    throw InputError(fmt::format("{}: damaged header: {}", path, firstLine(opened.input->geterror())));
-  }
-  const oiio::ImageSpec& spec = opened.spec;
-  if (spec.width < 1 || spec.height < 1 || spec.width > kMaxImageSize || spec.height > kMaxImageSize ||
-      spec.depth > 1 || spec.nchannels < 1 || spec.nchannels > kMaxChannels || spec.deep) {
+  std::string error;
+  opened.file = imageLibrary().open(path, opened.format, error);
+  if (!opened.file) throw InputError(fmt::format("{}: damaged header: {}", path, error));
+  const ImageFileHeader& header = opened.file->header();
+  if (header.width < 1 || header.height < 1 || header.width > kMaxImageSize || header.height > kMaxImageSize ||
+      header.depth > 1 || header.channels < 1 || header.channels > kMaxChannels || header.deep) {
     throw InputError(fmt::format("{}: expected up to {} x {} pixels of 1..{} channels, found {} x {} of {}{}", path,
-                                 kMaxImageSize, kMaxImageSize, kMaxChannels, spec.width, spec.height, spec.nchannels,
-                                 spec.deep ? " (deep)" : ""));
+                                 kMaxImageSize, kMaxImageSize, kMaxChannels, header.width, header.height,
+                                 header.channels, header.deep ? " (deep)" : ""));
   }
   const uint64_t fileBytes = std::filesystem::file_size(path);
-  if (spec.image_bytes(true) / kMaxCompression > fileBytes) {
+  if (header.bytes / kMaxCompression > fileBytes) {
     throw InputError(fmt::format("{}: cut short: {} x {} pixels of {} channels cannot lie in {} bytes", path,
-                                 spec.width, spec.height, spec.nchannels, fileBytes));
+                                 header.width, header.height, header.channels, fileBytes));
   }
   return opened;
 }
 
 /// Channels as the writer ordered them, where the file says so and names each of them once.
-Image inWrittenOrder(Image image, const oiio::ImageSpec& spec) {
+Image inWrittenOrder(Image image, const ImageFileReader& file) {
+  const std::vector<std::string>& names = file.header().channelNames;
   std::vector<int> source;
-  std::string order = spec.get_string_attribute(kChannelOrder);
+  const std::string order = file.text(kChannelOrder);
   for (size_t begin = 0; begin < order.size();) {
     const size_t end = std::min(order.find(',', begin), order.size());
-    const auto found = std::find(spec.channelnames.begin(), spec.channelnames.end(), order.substr(begin, end - begin));
-    source.push_back(int(found - spec.channelnames.begin()));
+    const auto found = std::find(names.begin(), names.end(), order.substr(begin, end - begin));
+    source.push_back(int(found - names.begin()));
     begin = end + 1;
   }
   std::vector<int> sorted = source;
@@ -173,18 +151,12 @@ uint8_t toByte(double value) {
   return uint8_t(std::min(255.0, std::floor(255.0 * value + 0.5)));
 }
 
-void write(const std::string& path, const char* format, oiio::ImageSpec spec, const oiio::TypeDesc& type,
-           const void* pixels, const ImageMetadata& metadata) {
-  quietOpenImageIo();
-  spec.attribute("DateTime", "");  // else today's: equal pictures should be equal files
-  for (const auto& [name, text] : metadata)
-    spec.attribute(name, text);
+void write(const std::string& path, const std::string& format, ImageFileContent content,
+           const ImageMetadata& metadata) {
+  content.attributes.insert(content.attributes.end(), metadata.begin(), metadata.end());
   AtomicFile file(path);
-  const std::unique_ptr<oiio::ImageOutput> output = oiio::ImageOutput::create(format);
-  if (!output) throw InternalError(std::string("OpenImageIO has no writer for ") + format);
-  if (!output->open(file.temporaryPath(), spec) || !output->write_image(type, pixels) || !output->close()) {
-    throw MachineError(fmt::format("{}: cannot write the image: {}", path, firstLine(output->geterror())));
-  }
+  const std::string error = imageLibrary().write(file.temporaryPath(), format, content);
+  if (!error.empty()) throw MachineError(fmt::format("{}: cannot write the image: {}", path, error));
   file.commit();
 }
 
@@ -222,47 +194,46 @@ void writePng(const std::string& path, const Image& image, const ImageMetadata& 
       to[c] = alpha > 0.0f ? toByte(srgbFromLinear(from[c] / alpha)) : 0;
     if (keepAlpha) to[3] = toByte(alpha);
   }
-  oiio::ImageSpec spec(image.size.x, image.size.y, channels, oiio::TypeDesc::UINT8);
-  spec.attribute("oiio:ColorSpace", "sRGB");
-  spec.attribute("oiio:UnassociatedAlpha", 1);
-  write(path, "png", std::move(spec), oiio::TypeDesc::UINT8, bytes.data(), metadata);
+  ImageFileContent content{image.size.x, image.size.y, SampleType::u8, {"R", "G", "B"}, keepAlpha, {}, bytes.data()};
+  if (keepAlpha) content.channelNames.push_back("A");
+  content.attributes.emplace_back("oiio:ColorSpace", "sRGB");
+  write(path, "png", std::move(content), metadata);
 }
 
 void writeExr(const std::string& path, const Image& image, std::span<const std::string> channelNames,
               const ImageMetadata& metadata) {
   checkEqual(channelNames.size(), size_t(image.channels), "number of channel names");
-  oiio::ImageSpec spec(image.size.x, image.size.y, image.channels, oiio::TypeDesc::FLOAT);
-  spec.channelnames.assign(channelNames.begin(), channelNames.end());
-  spec.alpha_channel = -1;
+  ImageFileContent content{image.size.x, image.size.y, SampleType::f32, {}, false, {}, image.pixels.data()};
+  content.channelNames.assign(channelNames.begin(), channelNames.end());
   std::string order;
   for (const std::string& name : channelNames)
     order += (order.empty() ? "" : ",") + name;
-  spec.attribute(kChannelOrder, order);
-  spec.attribute("compression", "zip");
-  write(path, "openexr", std::move(spec), oiio::TypeDesc::FLOAT, image.pixels.data(), metadata);
+  content.attributes.emplace_back(kChannelOrder, order);
+  content.attributes.emplace_back("compression", "zip");
+  write(path, "openexr", std::move(content), metadata);
 }
 
 Image readImage(const std::string& path) {
   const OpenedImage opened = openImage(path);
-  const oiio::ImageSpec& spec = opened.spec;
-  const glm::ivec2 size(spec.width, spec.height);
-  const auto read = [&](const oiio::TypeDesc& type, void* pixels) {
-    if (!opened.input->read_image(0, 0, 0, spec.nchannels, type, pixels)) {
-      throw InputError(fmt::format("{}: damaged or cut short: {}", path, firstLine(opened.input->geterror())));
+  const ImageFileHeader& header = opened.file->header();
+  const glm::ivec2 size(header.width, header.height);
+  const auto read = [&](SampleType type, void* pixels) {
+    if (!opened.file->read(0, header.height, 0, header.channels, type, pixels)) {
+      throw InputError(fmt::format("{}: damaged or cut short: {}", path, opened.file->error()));
     }
   };
   if (opened.format == "png") {
-    std::vector<uint16_t> codes(spec.image_pixels() * size_t(spec.nchannels));
-    read(oiio::TypeDesc::UINT16, codes.data());
-    return linearPicture(size, spec.nchannels, codes);
+    std::vector<uint16_t> codes(size_t(header.width) * size_t(header.height) * size_t(header.channels));
+    read(SampleType::u16, codes.data());
+    return linearPicture(size, header.channels, codes);
   }
-  Image image(size, spec.nchannels);
-  read(oiio::TypeDesc::FLOAT, image.pixels.data());
-  return inWrittenOrder(std::move(image), spec);
+  Image image(size, header.channels);
+  read(SampleType::f32, image.pixels.data());
+  return inWrittenOrder(std::move(image), *opened.file);
 }
 
 std::string readImageCommand(const std::string& path) {
-  return openImage(path).spec.get_string_attribute("Command");
+  return openImage(path).file->text("Command");
 }
 
 }  // namespace freevoxel

@@ -13,6 +13,9 @@ option(FREEVOXEL_SANITIZE "Build with the address and undefined behaviour saniti
 option(FREEVOXEL_JOIN_SOURCES "Compile the program's and the tests' files several at a time: most of their time is headers"
        ON)
 
+set(FREEVOXEL_TEST_SHARDS 0 CACHE STRING "Run each test program as so many CTest tests, 0: one for every case of it.
+A program with sanitizers takes long to start")
+
 find_package(PkgConfig REQUIRED)
 find_package(OpenMP REQUIRED COMPONENTS CXX)
 find_package(Threads REQUIRED)
@@ -51,7 +54,8 @@ function(freevoxel_library name)
   target_link_libraries(freevoxel_${name} PUBLIC freevoxel_settings ${arg_LINKS})
 endfunction()
 
-# freevoxel_test(NAME SOURCES ... LINKS ... [LABELS label] [SEPARATE]): a GoogleTest program; every case of it is a CTest test.
+# freevoxel_test(NAME SOURCES ... LINKS ... [LABELS label] [SEPARATE]): a GoogleTest program; every case of it is a CTest
+# test (FREEVOXEL_TEST_SHARDS apart).
 # Tests labelled "quick" also run under the sanitizers, those labelled "full" only in scripts/test_full.sh. (One label:
 # gtest_discover_tests would take a second one, or an empty one, for the next property.) SEPARATE: files are compiled one
 # by one, since several define the same names.
@@ -71,6 +75,15 @@ function(freevoxel_test name)
   # where files are joined).
   target_compile_options(${name} PRIVATE -O1 $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)
   target_link_libraries(${name} PRIVATE ${arg_LINKS} freevoxel_test_support)
+  if(FREEVOXEL_TEST_SHARDS GREATER 0)
+    math(EXPR last "${FREEVOXEL_TEST_SHARDS} - 1")
+    foreach(shard RANGE ${last})
+      add_test(NAME ${name}_${shard} COMMAND ${name})
+      set_tests_properties(${name}_${shard} PROPERTIES ${labels} TIMEOUT 1200
+        ENVIRONMENT "${FREEVOXEL_TEST_ENVIRONMENT};GTEST_TOTAL_SHARDS=${FREEVOXEL_TEST_SHARDS};GTEST_SHARD_INDEX=${shard}")
+    endforeach()
+    return()
+  endif()
   gtest_discover_tests(${name}
     DISCOVERY_TIMEOUT 60
     PROPERTIES ${labels} TIMEOUT ${arg_TIMEOUT}

@@ -1,10 +1,9 @@
-#include <OpenImageIO/imageio.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <memory>
 
 #include "base/error.h"
+#include "base/image_library.h"
 #include "base/mapped_file.h"
 #include "volume/component.h"
 #include "volume/header_reading.h"
@@ -14,15 +13,8 @@ namespace freevoxel {
 
 namespace {
 
-namespace oiio = OIIO;
-
 /// No picture packs better than this: a damaged header must not make us reserve memory for pixels that cannot be there.
 constexpr uint64_t kMaxCompression = 4096;
-
-std::string firstLine(std::string text) {
-  text.erase(std::find(text.begin(), text.end(), '\n'), text.end());
-  return text.empty() ? "unknown reason" : text;
-}
 
 /// libpng is content with a picture that lacks its end.
 void checkPngEnd(const std::string& path) {
@@ -64,34 +56,34 @@ void checkTiffPages(const std::string& path) {
   }
 }
 
-ValueType valueType(const std::string& path, oiio::TypeDesc type) {
-  switch (type.basetype) {
-    case oiio::TypeDesc::UINT8:
+ValueType valueType(const std::string& path, const ImageFileHeader& header) {
+  switch (header.type) {
+    case SampleType::u8:
       return ValueType::u8;
-    case oiio::TypeDesc::INT8:
+    case SampleType::i8:
       return ValueType::i8;
-    case oiio::TypeDesc::UINT16:
+    case SampleType::u16:
       return ValueType::u16;
-    case oiio::TypeDesc::INT16:
+    case SampleType::i16:
       return ValueType::i16;
-    case oiio::TypeDesc::UINT32:
+    case SampleType::u32:
       return ValueType::u32;
-    case oiio::TypeDesc::INT32:
+    case SampleType::i32:
       return ValueType::i32;
-    case oiio::TypeDesc::HALF:
-    case oiio::TypeDesc::FLOAT:
+    case SampleType::f16:
+    case SampleType::f32:
       return ValueType::f32;
-    case oiio::TypeDesc::DOUBLE:
+    case SampleType::f64:
       return ValueType::f64;
-    default:
-      throw InputError(fmt::format("{}: expected pixels of plain numbers, found {}", path, type.c_str()));
+    case SampleType::other:
+      break;
   }
+  throw InputError(fmt::format("{}: expected pixels of plain numbers, found {}", path, header.typeName));
 }
 
-oiio::TypeDesc pixelType(ValueType type) {
-  constexpr oiio::TypeDesc::BASETYPE kTypes[] = {oiio::TypeDesc::UINT8, oiio::TypeDesc::INT8,   oiio::TypeDesc::UINT16,
-                                                 oiio::TypeDesc::INT16, oiio::TypeDesc::UINT32, oiio::TypeDesc::INT32,
-                                                 oiio::TypeDesc::FLOAT, oiio::TypeDesc::DOUBLE};
+SampleType sampleType(ValueType type) {
+  constexpr SampleType kTypes[] = {SampleType::u8,  SampleType::i8,  SampleType::u16, SampleType::i16,
+                                   SampleType::u32, SampleType::i32, SampleType::f32, SampleType::f64};
   return kTypes[int(type)];
 }
 
@@ -100,75 +92,71 @@ class OpenedImage {
   explicit OpenedImage(const std::string& path) : path_(path) {
     checkPngEnd(path);
     checkTiffPages(path);
-    oiio::ImageSpec wishes;
-    wishes["oiio:UnassociatedAlpha"] = 1;
-    input_ = oiio::ImageInput::open(path, &wishes);
-    if (!input_) throw InputError(fmt::format("{}: damaged header: {}", path, firstLine(oiio::geterror())));
+    std::string error;
+    input_ = imageLibrary().open(path, "", error);
+    if (!input_) throw InputError(fmt::format("{}: damaged header: {}", path, error));
     checkPage();
   }
 
-  const oiio::ImageSpec& spec() const { return input_->spec(); }
-  ValueType type() const { return valueType(path_, spec().format); }
+  const ImageFileHeader& header() const { return input_->header(); }
+  ValueType type() const { return valueType(path_, header()); }
 
   int countPages() {
     int count = 1;
-    while (input_->seek_subimage(count, 0))
+    while (input_->select(count))
       ++count;
-    input_->geterror();
+    input_->error();
     return count;
   }
   /// Page `index`, which has to be of the kind of the first one.
-  void readPage(int index, int channel, const VolumeHeader& header, const std::string& firstPath,
+  void readPage(int index, int channel, const VolumeHeader& expected, const std::string& firstPath,
                 std::span<std::byte> out) {
-    if (!input_->seek_subimage(index, 0)) {
-      throw InputError(fmt::format("{}: page {}: damaged: {}", path_, index, firstLine(input_->geterror())));
+    if (!input_->select(index)) {
+      throw InputError(fmt::format("{}: page {}: damaged: {}", path_, index, input_->error()));
     }
     checkPage();
-    const oiio::ImageSpec& page = spec();
-    if (page.width != header.dims.x || page.height != header.dims.y || type() != header.type ||
-        channel >= page.nchannels) {
+    const ImageFileHeader& page = header();
+    if (page.width != expected.dims.x || page.height != expected.dims.y || type() != expected.type ||
+        channel >= page.channels) {
       throw InputError(fmt::format("{}{}: expected {} x {} pixels of type {} as in {}, found {} x {} of type {}", path_,
-                                   index > 0 ? fmt::format(": page {}", index) : "", header.dims.x, header.dims.y,
-                                   valueTypeName(header.type), firstPath, page.width, page.height,
+                                   index > 0 ? fmt::format(": page {}", index) : "", expected.dims.x, expected.dims.y,
+                                   valueTypeName(expected.type), firstPath, page.width, page.height,
                                    valueTypeName(type())));
     }
-    if (!input_->read_image(index, 0, channel, channel + 1, pixelType(header.type), out.data()) ||
-        input_->has_error()) {
-      throw InputError(fmt::format("{}: damaged or cut short: {}", path_, firstLine(input_->geterror())));
+    if (!input_->read(0, page.height, channel, channel + 1, sampleType(expected.type), out.data())) {
+      throw InputError(fmt::format("{}: damaged or cut short: {}", path_, input_->error()));
     }
   }
 
  private:
   void checkPage() const {
-    const oiio::ImageSpec& page = spec();
+    const ImageFileHeader& page = header();
     if (page.width < 1 || page.height < 1 || page.width > kMaxDim || page.height > kMaxDim || page.depth > 1 ||
-        page.nchannels < 1 || page.deep) {
+        page.channels < 1 || page.deep) {
       throw InputError(fmt::format("{}: expected a flat picture, found {} x {} x {} pixels of {} channels", path_,
-                                   page.width, page.height, page.depth, page.nchannels));
+                                   page.width, page.height, page.depth, page.channels));
     }
-    if (page.image_bytes(true) / kMaxCompression > std::filesystem::file_size(path_)) {
+    if (page.bytes / kMaxCompression > std::filesystem::file_size(path_)) {
       throw InputError(fmt::format("{}: cut short: {} x {} pixels of {} channels cannot lie in {} bytes", path_,
-                                   page.width, page.height, page.nchannels, std::filesystem::file_size(path_)));
+                                   page.width, page.height, page.channels, std::filesystem::file_size(path_)));
     }
   }
 
   std::string path_;
-  std::unique_ptr<oiio::ImageInput> input_;
+  std::unique_ptr<ImageFileReader> input_;
 };
 
 }  // namespace
 
 void readImageStack(const LibraryRequest& request, SliceSink& sink) {
-  oiio::attribute("threads", 1);
-  oiio::attribute("exr_threads", -1);
   const std::string& firstPath = request.files.at(0);
   auto image = std::make_unique<OpenedImage>(firstPath);
   const bool pages = request.files.size() == 1;
   VolumeHeader header;
   header.type = image->type();
-  header.dims = {image->spec().width, image->spec().height, 1};
-  std::vector<std::string> names = image->spec().channelnames;
-  if (names.size() != size_t(image->spec().nchannels)) names = numberedComponents(image->spec().nchannels);
+  header.dims = {image->header().width, image->header().height, 1};
+  std::vector<std::string> names = image->header().channelNames;
+  if (names.size() != size_t(image->header().channels)) names = numberedComponents(image->header().channels);
   const int channel = int(chooseComponent(names, request.component, firstPath));
   header.dims.z = pages ? image->countPages() : int(request.files.size());
   sink.header(header);
