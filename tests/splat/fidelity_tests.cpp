@@ -13,7 +13,7 @@ namespace {
 
 using namespace test;
 
-constexpr int kViews = 20;
+constexpr int kViews = 6;  // bench/fidelity takes 20
 
 /// Lowest PSNR of `normalised` kernels against the pre-classified reference over fixed random views.
 /// Images are large enough for a voxel to be wider than a pixel: the reference takes one ray per pixel, while splats

@@ -61,11 +61,11 @@ TEST_F(ChildReader, damagedVdbFiles) {
   if (!dataFolder()) GTEST_SKIP() << kNoData;
   const std::string whole = readBytes(*dataFolder() + "/vdb/sphere.vdb");
   const std::string path = fileOf(whole, "b.vdb");
-  for (size_t part = 1; part < 8; ++part) {
+  for (const size_t part : {1, 4, 7}) {
     writeBytes(path, whole.substr(0, whole.size() * part / 8));
     EXPECT_THROW(readVolume(path), InputError) << part;
   }
-  for (size_t part = 0; part < 8; ++part) {
+  for (const size_t part : {0, 2, 5}) {
     std::string damaged = whole;
     for (size_t i = 0; i < 8; ++i)
       damaged[std::min(damaged.size() - 1, part * 37 + i)] = char(0xee);

@@ -108,7 +108,7 @@ TEST_F(ImageStack, missingAndMixedSlices) {
 TEST_F(ImageStack, truncationsFail) {
   const std::string folder = pngStack(3);
   const std::string whole = readBytes(folder + "/s2.png");
-  for (size_t length = 0; length < whole.size(); length += 11) {
+  for (size_t length = 0; length < whole.size(); length += 23) {
     writeBytes(folder + "/s2.png", whole.substr(0, length));
     EXPECT_THROW(readVolume(folder), InputError) << length;
   }
@@ -117,8 +117,8 @@ TEST_F(ImageStack, truncationsFail) {
   writeSlice<float>(exr, ValueType::f32, oiio::TypeDesc::FLOAT, 0);
   for (const std::string& path : {tiff, exr}) {
     const std::string content = readBytes(path);
-    for (size_t part = 0; part < 20; ++part) {
-      writeBytes(path, content.substr(0, content.size() * part / 20));
+    for (size_t part = 0; part < 8; ++part) {
+      writeBytes(path, content.substr(0, content.size() * part / 8));
       EXPECT_THROW(readVolume(path), InputError) << path << " " << part;
     }
   }
