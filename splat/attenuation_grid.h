@@ -29,6 +29,7 @@ struct Towards {
   glm::dvec3 from(glm::dvec3 voxel) const { return directional ? index : index - voxel; }
   /// Whether the target is a point in the box of a volume, which reaches half a voxel beyond its samples.
   bool inside(glm::ivec3 dims) const;
+  bool operator==(const Towards&) const = default;
 };
 
 /// Attenuation as 0..65535, x fastest.

@@ -45,7 +45,7 @@ class Lamps {
         for (size_t i = 0; i < voxels.size(); ++i) {
           if (!outside(voxels[i]))
             ofLamp[i] =
-                float(attenuation.grid.values[linearIndex(voxels[i], grid_.dims)]) * (1.0f / AttenuationGrid::kUnit);
+                float(attenuation.grid->values[linearIndex(voxels[i], grid_.dims)]) * (1.0f / AttenuationGrid::kUnit);
         }
       }
     }

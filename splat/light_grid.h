@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -28,7 +29,7 @@ struct LightGrid {
 struct LampAttenuation {
   std::optional<StoredAttenuation> stored;
   std::optional<size_t> pin;
-  AttenuationGrid grid;  ///< if neither
+  std::shared_ptr<const AttenuationGrid> grid;  ///< if neither
 };
 
 /// Ambient light, and every lamp's times what the volume lets through to the voxel times its shading, in one pass over

@@ -91,6 +91,9 @@ std::string_view attenuationSourceName(AttenuationSource source) {
   throw InternalError("internal error: unknown source of attenuation");
 }
 
+/// That attenuation towards lamps may take between two frames.
+constexpr uint64_t kKeptLampBytes = uint64_t(1) << 30;
+
 struct Splatter::State {
   const AttenuationFile* file = nullptr;  ///< may be null
   const ValueGrid* given = nullptr;       ///< may be null if there is a file
@@ -121,7 +124,8 @@ struct Splatter::State {
     AttenuationGrid attenuation;
     LightGrid light;
     std::optional<VoxelLighting> lighting;
-    std::vector<LampAttenuation> swept;  ///< per lamp; unused where stored
+    std::vector<std::shared_ptr<const AttenuationGrid>>
+        lampGrids;  ///< per lamp; null where it is looked up in the file
     std::vector<std::unique_ptr<CoarseRatio>> ratios;
     std::unique_ptr<BlockSource> source;
     float lightScale = 1.0f;
@@ -129,6 +133,17 @@ struct Splatter::State {
     SplatStatistics statistics;
   };
   std::unique_ptr<Frame> frame;
+
+  /// Attenuation towards a lamp, which stays while the lamp does: pictures of a turntable share it.
+  struct KeptLamp {
+    Towards target;
+    AttenuationSource source;
+    Footprint footprint;
+    std::shared_ptr<const AttenuationGrid> grid;
+    uint64_t lastUsed = 0;  ///< frame
+  };
+  std::vector<KeptLamp> keptLamps;
+  uint64_t frameNumber = 0;
 
   void open(Backend backend);
   const ValueGrid& grid();
@@ -139,6 +154,9 @@ struct Splatter::State {
   AttenuationSource chosen(AttenuationSource source, const Towards& target, bool lamp) const;
   /// What kernels draw leaves out a voxel's own matter, so there the near field is not traced.
   AttenuationGrid attenuationTowards(const Towards& target, AttenuationSource source, Footprint footprint);
+  std::shared_ptr<const AttenuationGrid> lampGrid(const Towards& target, AttenuationSource source, Footprint footprint);
+  /// Forgets those that were not used for the longest time, down to so many bytes.
+  void forgetLamps(uint64_t bytesLeft);
   StoredTarget storedTarget(Frame& to, const Towards& target, AttenuationSource source, bool nearest);
   void lookIntoGrids(Frame& to, const Towards& eye, AttenuationSource source);
   void lookIntoFile(Frame& to, const Towards& eye, AttenuationSource source);
@@ -251,6 +269,25 @@ AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, Atten
   return result;
 }
 
+std::shared_ptr<const AttenuationGrid> Splatter::State::lampGrid(const Towards& target, AttenuationSource source,
+                                                                 Footprint footprint) {
+  for (KeptLamp& kept : keptLamps) {
+    if (kept.target != target || kept.source != source || kept.footprint != footprint) continue;
+    kept.lastUsed = frameNumber;
+    return kept.grid;
+  }
+  auto grid = std::make_shared<const AttenuationGrid>(attenuationTowards(target, source, footprint));
+  keptLamps.push_back({target, source, footprint, grid, frameNumber});
+  return grid;
+}
+
+void Splatter::State::forgetLamps(uint64_t bytesLeft) {
+  std::sort(keptLamps.begin(), keptLamps.end(),
+            [](const KeptLamp& a, const KeptLamp& b) { return a.lastUsed > b.lastUsed; });
+  const uint64_t each = voxelCount(dims) * sizeof(uint16_t);
+  if (keptLamps.size() > bytesLeft / each) keptLamps.resize(size_t(bytesLeft / each));
+}
+
 LightGrid Splatter::State::lightVoxels(const Camera& camera, const SplatOptions& options, SplatStatistics& statistics) {
   std::vector<LampAttenuation> lamps;
   checkLighting(options.lighting);
@@ -263,7 +300,7 @@ LightGrid Splatter::State::lightVoxels(const Camera& camera, const SplatOptions&
     } else if (source == AttenuationSource::pinned) {
       attenuation.pin = findPin(*file, target);
     } else {
-      attenuation.grid = attenuationTowards(target, source, options.footprint);
+      attenuation.grid = lampGrid(target, source, options.footprint);
     }
     lamps.push_back(std::move(attenuation));
     statistics.lightAttenuation = attenuationSourceName(source);
@@ -333,8 +370,8 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
     to.lighting.emplace(placement, options.lighting, to.camera);
     to.lightScale = to.lighting->scale();
     look.lighting = &*to.lighting;
-    to.swept.resize(options.lighting.lights.size());
-    for (size_t i = 0; i < to.swept.size(); ++i) {
+    to.lampGrids.resize(options.lighting.lights.size());
+    for (size_t i = 0; i < to.lampGrids.size(); ++i) {
       const Towards target = towardsLamp(placement, options.lighting.lights[i]);
       const AttenuationSource ofLamp = chosen(options.lightAttenuation, target, true);
       to.statistics.lightAttenuation = attenuationSourceName(ofLamp);
@@ -342,8 +379,8 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
       // Corrected attenuation is traced near the voxel, pinned is swept: both are of the whole volume.
       if (ofLamp == AttenuationSource::swept || ofLamp == AttenuationSource::pinned ||
           ofLamp == AttenuationSource::corrected) {
-        to.swept[i].grid = attenuationTowards(target, ofLamp, options.footprint);
-        lamp.swept = &to.swept[i].grid;
+        to.lampGrids[i] = lampGrid(target, ofLamp, options.footprint);
+        lamp.swept = to.lampGrids[i].get();
         fixedBytes += voxelCount(dims) * sizeof(uint16_t);
       } else {
         lamp.stored = storedTarget(to, target, ofLamp, false);
@@ -376,6 +413,7 @@ std::span<const VisibleBlock> Splatter::blocks() const {
 void Splatter::prepare(const Camera& camera, const SplatOptions& options) {
   State& state = *state_;
   state.frame.reset();
+  ++state.frameNumber;
   auto frame = std::make_unique<State::Frame>();
   frame->camera = camera;
   frame->options = options;
@@ -406,6 +444,7 @@ void Splatter::prepare(const Camera& camera, const SplatOptions& options) {
   } else {
     state.lookIntoFile(*frame, eye, source);
   }
+  state.forgetLamps(options.memoryBytes == 0 ? kKeptLampBytes : 0);
   statistics.attenuationSeconds = secondsSince(attenuationStart) - statistics.lightSeconds;
   state.frame = std::move(frame);
 }

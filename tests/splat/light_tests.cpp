@@ -50,7 +50,9 @@ TEST(Gradient, OfARampIsItsSlopeInWorldAxes) {
 
 LightGrid lightWithNothingInTheWay(const ValueGrid& grid, const Lighting& lighting) {
   LampAttenuation open;
-  open.grid.values.assign(grid.codes.size(), 65535);
+  auto clear = std::make_shared<AttenuationGrid>();
+  clear->values.assign(grid.codes.size(), 65535);
+  open.grid = clear;
   const std::vector<LampAttenuation> attenuations(lighting.lights.size(), open);
   return lightGrid(grid, findVisibleCubes(grid, uniformOpacity(0.1)), nullptr, lighting, Camera{}, attenuations);
 }
