@@ -116,7 +116,7 @@ void keepLabelsApart(RenderOptions& options, const CLI::App& command) {
   refuse("--attenuation", options.splat.attenuation == AttenuationSource::swept);
   options.raycast.classification = RaycastClassification::nearest;
   options.splat.footprint = Footprint::kernel;
-  options.splat.attenuation = AttenuationSource::stored;
+  options.splat.attenuation = AttenuationSource::interpolated;
 }
 
 /// The transfer function to draw an attenuation file with: its own, or one of the same opacities.
@@ -357,14 +357,18 @@ Command addRender(CLI::App& program, CommonOptions& common) {
                        "what a splat covers: cells between voxels, or the paper's kernels round voxels (default for "
                        "formula paper)");
   const std::vector<std::pair<std::string, AttenuationSource>> sources = {
-      {"auto", AttenuationSource::automatic},      {"stored", AttenuationSource::stored},
-      {"corrected", AttenuationSource::corrected}, {"swept", AttenuationSource::swept},
-      {"pinned", AttenuationSource::pinned},       {"quotient", AttenuationSource::quotient}};
+      {"auto", AttenuationSource::automatic},
+      {"stored", AttenuationSource::stored},
+      {"interpolated", AttenuationSource::interpolated},
+      {"swept", AttenuationSource::swept},
+      {"pinned", AttenuationSource::pinned},
+      {"quotient", AttenuationSource::quotient}};
   addChoice<AttenuationSource>(*command, "--attenuation", options->splat.attenuation, sources,
-                               "what light loses on its way to the eye: from the file's 26 directions, from these "
-                               "corrected by a coarse sweep, swept for this eye, pinned in the file, or from the 26 "
-                               "with the paper's quotient for an eye inside the volume; auto takes a pin that is the "
-                               "eye, else corrected with an attenuation file and the eye outside, else swept");
+                               "what light loses on its way to the eye: from the file's 26 directions, corrected by a "
+                               "coarse sweep; interpolated among the 26 and no more; swept for this eye; pinned in the "
+                               "file; or from the 26 with the paper's quotient for an eye inside the volume; auto "
+                               "takes a pin that is the eye, else stored with an attenuation file and the eye outside, "
+                               "else swept");
   addChoice<AttenuationSource>(*command, "--light-attenuation", options->splat.lightAttenuation, sources,
                                "the same for light on its way from the lamps; auto takes a pin that is the lamp, else "
                                "stored with an attenuation file and the lamp outside, else swept");

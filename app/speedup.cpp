@@ -492,7 +492,7 @@ Command addSpeedup(CLI::App& program, CommonOptions& common) {
   addChoice<AttenuationSource>(*command, "--attenuation", options->splat.attenuation,
                                {{"auto", AttenuationSource::automatic},
                                 {"stored", AttenuationSource::stored},
-                                {"corrected", AttenuationSource::corrected},
+                                {"interpolated", AttenuationSource::interpolated},
                                 {"swept", AttenuationSource::swept}},
                                "what light loses on its way to the eye, as of render; every rank works it out alike");
   addChoice<Backend>(*command, "--backend", options->backend,

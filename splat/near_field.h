@@ -5,7 +5,7 @@
 
 namespace freevoxel {
 
-/// Planes that are traced before corrected attenuation.
+/// Planes that are traced before stored attenuation.
 inline constexpr int kNearPlanes = 4;
 
 /// Replaces attenuation at every voxel of a visible cube by what the voxel's own ray towards the target loses over the

@@ -77,10 +77,10 @@ std::string_view attenuationSourceName(AttenuationSource source) {
   switch (source) {
     case AttenuationSource::automatic:
       return "auto";
+    case AttenuationSource::interpolated:
+      return "interpolated";
     case AttenuationSource::stored:
       return "stored";
-    case AttenuationSource::corrected:
-      return "corrected";
     case AttenuationSource::swept:
       return "swept";
     case AttenuationSource::pinned:
@@ -240,7 +240,7 @@ AttenuationSource Splatter::State::chosen(AttenuationSource source, const Toward
     if (file != nullptr && findPin(*file, target)) return AttenuationSource::pinned;
     // What is stored runs on to the outside, past a target inside the volume.
     if (file == nullptr || target.inside(dims)) return AttenuationSource::swept;
-    return lamp ? AttenuationSource::stored : AttenuationSource::corrected;
+    return AttenuationSource::stored;
   }
   if (source != AttenuationSource::swept && file == nullptr) {
     throw InputError(fmt::format("{} attenuation needs an attenuation file; make one with freevoxel precompute",
@@ -261,7 +261,7 @@ AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, Atten
   if (source == AttenuationSource::swept) return sweptAttenuation(grid(), table, visibleCubes(), target);
   if (source == AttenuationSource::pinned) return pinnedAttenuation(*file, findPin(*file, target).value());
   AttenuationGrid result = storedAttenuation(*file, target, lookupOf(source));
-  if (source == AttenuationSource::corrected) {
+  if (source == AttenuationSource::stored) {
     coarseVolume().correct(target, result);
     if (footprint == Footprint::cell)
       result = withNearField(grid(), table, visibleCubes(), target, kNearPlanes, result);
@@ -295,7 +295,7 @@ LightGrid Splatter::State::lightVoxels(const Camera& camera, const SplatOptions&
     const Towards target = towardsLamp(placement, lamp);
     const AttenuationSource source = chosen(options.lightAttenuation, target, true);
     LampAttenuation attenuation;
-    if (source == AttenuationSource::stored || source == AttenuationSource::quotient) {
+    if (source == AttenuationSource::interpolated || source == AttenuationSource::quotient) {
       attenuation.stored.emplace(*file, target, lookupOf(source));
     } else if (source == AttenuationSource::pinned) {
       attenuation.pin = findPin(*file, target);
@@ -318,7 +318,8 @@ void Splatter::State::shareMemory(Frame& to, uint64_t fixedBytes, uint64_t bytes
   const uint64_t perBlock = bytesPerBlock + cpuCanvasBytes(blockEdge);
   if (allowed < fixedBytes + perBlock) {
     throw MachineError(
-        fmt::format("this picture needs {} bytes of memory, {} are allowed; allow more, or make it smaller",
+        fmt::format("this picture needs {} bytes of memory, {} are allowed; allow more, make it smaller, or take "
+                    "--attenuation interpolated",
                     fixedBytes + perBlock, allowed));
   }
   const uint64_t rest = allowed - fixedBytes;
@@ -329,7 +330,8 @@ void Splatter::State::shareMemory(Frame& to, uint64_t fixedBytes, uint64_t bytes
 void Splatter::State::lookIntoGrids(Frame& to, const Towards& eye, AttenuationSource source) {
   if (to.options.lodPixels > 0.0) {
     throw InputError(
-        "swept and pinned attenuation know the finest level only; leave --lod out, or take --attenuation stored");
+        "swept and pinned attenuation know the finest level only; leave --lod out, or take --attenuation stored or "
+        "interpolated");
   }
   uint64_t sourceBytes = 0;
   const uint64_t perVoxel = 2 * sizeof(uint16_t) + (to.options.lighting.unlit() ? 0 : sizeof(LightValue));
@@ -345,7 +347,7 @@ void Splatter::State::lookIntoGrids(Frame& to, const Towards& eye, AttenuationSo
 
 StoredTarget Splatter::State::storedTarget(Frame& to, const Towards& target, AttenuationSource source, bool nearest) {
   StoredTarget result{target, nearest ? StoredLookup::nearest : lookupOf(source), nullptr};
-  if (source == AttenuationSource::corrected) {
+  if (source == AttenuationSource::stored) {
     to.ratios.push_back(std::make_unique<CoarseRatio>(coarseVolume().ratio(target)));
     result.ratio = to.ratios.back().get();
   }
@@ -376,9 +378,9 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
       const AttenuationSource ofLamp = chosen(options.lightAttenuation, target, true);
       to.statistics.lightAttenuation = attenuationSourceName(ofLamp);
       LampSource lamp;
-      // Corrected attenuation is traced near the voxel, pinned is swept: both are of the whole volume.
+      // Stored attenuation is traced near the voxel, pinned is swept: both are of the whole volume.
       if (ofLamp == AttenuationSource::swept || ofLamp == AttenuationSource::pinned ||
-          ofLamp == AttenuationSource::corrected) {
+          ofLamp == AttenuationSource::stored) {
         to.lampGrids[i] = lampGrid(target, ofLamp, options.footprint);
         lamp.swept = to.lampGrids[i].get();
         fixedBytes += voxelCount(dims) * sizeof(uint16_t);
@@ -430,14 +432,14 @@ void Splatter::prepare(const Camera& camera, const SplatOptions& options) {
   const Towards eye = towardsEye(state.placement, camera);
   // The paper looks up the nearest direction, wherever the eye is.
   AttenuationSource source = options.attenuation;
-  if (paper && source == AttenuationSource::automatic) source = AttenuationSource::stored;
-  if (paper && source != AttenuationSource::stored) {
+  if (paper && source == AttenuationSource::automatic) source = AttenuationSource::interpolated;
+  if (paper && source != AttenuationSource::interpolated) {
     throw InputError("formula paper takes the nearest of the 26 stored directions; leave --attenuation out");
   }
   source = state.chosen(source, eye, false);
   statistics.attenuation = attenuationSourceName(source);
   // What is swept, or traced near the voxel, is an array of the whole volume.
-  const bool nearField = source == AttenuationSource::corrected && options.footprint == Footprint::cell;
+  const bool nearField = source == AttenuationSource::stored && options.footprint == Footprint::cell;
   if (source == AttenuationSource::swept || source == AttenuationSource::pinned ||
       (nearField && options.lodPixels == 0.0)) {
     state.lookIntoGrids(*frame, eye, source);
@@ -486,7 +488,7 @@ Sums Splatter::drawFrameBlocks(std::span<const VisibleBlock> blocks, float quant
   drawing.view = &frame.view;
   drawing.options = &frame.options;
   drawing.context = state.context.get();
-  // Stored attenuation, corrected or not, is too rough to end a ray.
+  // What is stored is too rough to end a ray.
   drawing.endRays = frame.statistics.attenuation == attenuationSourceName(AttenuationSource::swept) ||
                     frame.statistics.attenuation == attenuationSourceName(AttenuationSource::pinned);
   drawing.blocksAtATime = frame.blocksAtATime;

@@ -30,14 +30,14 @@ enum class Footprint {
 
 /// Where attenuation towards the eye, or towards a lamp, comes from.
 enum class AttenuationSource {
-  automatic,  ///< pinned, if the file has a pin that is the target; else with an attenuation file, and the target
-              ///< outside the volume: `corrected` for the eye and `stored` for lamps; else swept
-  stored,     ///< the 26 directions of the file, which run on to the outside even if the target is inside
-  corrected,  ///< stored, corrected by a sweep of a coarse copy of the volume, and right before a voxel traced (which
-              ///< takes the values of the whole volume, and is left out where blocks of coarser levels are drawn)
-  swept,      ///< one sweep over the values for this target
-  pinned,     ///< a sweep for this target that the file holds: the bits that `swept` gives
-  quotient,   ///< stored, divided by the same at the target's own voxel: the paper's A_B / A_V for an eye inside
+  automatic,  ///< pinned, if the file has a pin that is the target; else stored, with an attenuation file and the
+              ///< target outside the volume; else swept
+  interpolated,  ///< among the 26 directions of the file, which run on to the outside even if the target is inside
+  stored,    ///< the same, corrected by a sweep of a coarse copy of the volume, and right before a voxel traced (which
+             ///< takes the values of the whole volume, and is left out where blocks of coarser levels are drawn)
+  swept,     ///< one sweep over the values for this target
+  pinned,    ///< a sweep for this target that the file holds: the bits that `swept` gives
+  quotient,  ///< interpolated, divided by the same at the target's own voxel: the paper's A_B / A_V for an eye inside
 };
 
 /// What is left out of a picture because nobody sees it. Deterministic: the same bits in any order.

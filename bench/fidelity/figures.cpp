@@ -112,7 +112,7 @@ void drawLeak(const UniformBox& box, const AttenuationFile& file, const std::str
       orbitCamera(worldBounds(box.grid.placement, kDims), {0.6, 0.35, std::nullopt}, {360, 300}, 0.5, std::nullopt);
   SplatOptions kernels, cells;
   kernels.footprint = Footprint::kernel;
-  kernels.attenuation = cells.attenuation = AttenuationSource::stored;
+  kernels.attenuation = cells.attenuation = AttenuationSource::interpolated;
   const Image pictures[] = {splatter.renderBlended(camera, BlendKernel::gaussian, {}, silentProgress()).image,
                             splatter.renderBlended(camera, BlendKernel::normalised, {}, silentProgress()).image,
                             resolve(splatter.render(camera, kernels, silentProgress()).sums, Formula::normalised),

@@ -36,7 +36,7 @@ void addHidden(Table& table, const Scene& scene, const TableOptions& options) {
   const AttenuationFile file = attenuationFile(scene, Classification::preintegrated, options.folders);
   Splatter splatter(scene.grid, &file, scene.transfer, Backend::cpu);
   for (const AttenuationSource source :
-       {AttenuationSource::stored, AttenuationSource::corrected, AttenuationSource::swept}) {
+       {AttenuationSource::interpolated, AttenuationSource::stored, AttenuationSource::swept}) {
     Measured measured;
     float alpha = 0.0f;
     uint64_t pieces = 0, allPieces = 0, hidden = 0, blocks = 0;

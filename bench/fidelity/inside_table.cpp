@@ -49,7 +49,7 @@ void addInside(Table& table, const Scene& scene, const TableOptions& options) {
   const AttenuationFile file = attenuationFile(scene, Classification::preintegrated, options.folders);
   Splatter splatter(scene.grid, &file, scene.transfer, Backend::cpu);
   for (const AttenuationSource source :
-       {AttenuationSource::stored, AttenuationSource::quotient, AttenuationSource::swept}) {
+       {AttenuationSource::interpolated, AttenuationSource::quotient, AttenuationSource::swept}) {
     Measured measured;
     uint64_t burnt = 0, black = 0;
     for (const Camera& view : insideViews(scene.bounds(), kPositions, options.imageSize)) {

@@ -60,7 +60,7 @@ void addLights(Table& table, const Scene& scene, const TableOptions& options) {
   Splatter splatter(scene.grid, &file, scene.transfer, Backend::cpu);
   const Camera view = randomViews(scene.bounds(), 1, options.imageSize).front();
   for (const AttenuationSource source :
-       {AttenuationSource::stored, AttenuationSource::corrected, AttenuationSource::pinned}) {
+       {AttenuationSource::interpolated, AttenuationSource::stored, AttenuationSource::pinned}) {
     for (const auto& [name, shading] : {std::pair("none", Shading::none), std::pair("phong", Shading::phong)}) {
       SplatOptions splats[std::size(kCounts)];
       std::vector<double> seconds[std::size(kCounts)];

@@ -42,7 +42,7 @@ std::string cellRow(AttenuationSource source) {
 
 std::vector<Row> allRows() {
   constexpr Footprint kKernel = Footprint::kernel, kCell = Footprint::cell;
-  constexpr AttenuationSource kSources[] = {AttenuationSource::stored, AttenuationSource::corrected,
+  constexpr AttenuationSource kSources[] = {AttenuationSource::interpolated, AttenuationSource::stored,
                                             AttenuationSource::swept};
   std::vector<Row> rows;
   const auto add = [&](const std::string& name, Formula formula, Footprint footprint, AttenuationSource source) {
@@ -58,11 +58,11 @@ std::vector<Row> allRows() {
   rows.push_back(coarse);
   rows.push_back({kOrdered, {}, BlendKernel::normalised, Classification::voxel, {}});
   rows.push_back({"`blended` in order, Gaussian of peak 1", {}, BlendKernel::gaussian, Classification::voxel, {}});
-  add("`paper`, kernel, nearest of 26", Formula::paper, kKernel, AttenuationSource::stored);
-  add("`direct`, kernel, stored", Formula::direct, kKernel, AttenuationSource::stored);
+  add("`paper`, kernel, nearest of 26", Formula::paper, kKernel, AttenuationSource::interpolated);
+  add("`direct`, kernel, interpolated", Formula::direct, kKernel, AttenuationSource::interpolated);
   for (const AttenuationSource source : kSources)
     add(fmt::format("`normalised`, kernel, {}", attenuationSourceName(source)), Formula::normalised, kKernel, source);
-  add("`direct`, cell, stored", Formula::direct, kCell, AttenuationSource::stored);
+  add("`direct`, cell, interpolated", Formula::direct, kCell, AttenuationSource::interpolated);
   add("`direct`, cell, swept", Formula::direct, kCell, AttenuationSource::swept);
   for (const AttenuationSource source : kSources)
     add(cellRow(source), Formula::normalised, kCell, source);
@@ -98,10 +98,10 @@ void addBars(Table& table, const Scene& scene, const std::map<std::string, doubl
   if (table.head.empty()) {
     table.head = {"volume",
                   "swept less one-voxel ray casting (real volumes: above 0)",
+                  "interpolated less ordered blending (above 0)",
+                  "interpolated less one-voxel ray casting (real: above -3)",
                   "stored less ordered blending (above 0)",
-                  "stored less one-voxel ray casting (real: above -3)",
-                  "corrected less ordered blending (above 0)",
-                  "corrected less one-voxel ray casting (real: above -3)"};
+                  "stored less one-voxel ray casting (real: above -3)"};
   }
   const auto difference = [&](AttenuationSource source, const char* other) -> std::string {
     const auto a = pooled.find(cellRow(source)), b = pooled.find(other);
@@ -109,9 +109,9 @@ void addBars(Table& table, const Scene& scene, const std::map<std::string, doubl
   };
   table.rows.push_back(
       {scene.source.title + (scene.source.real() ? "" : " (procedural)"),
-       difference(AttenuationSource::swept, kOneVoxel), difference(AttenuationSource::stored, kOrdered),
-       difference(AttenuationSource::stored, kOneVoxel), difference(AttenuationSource::corrected, kOrdered),
-       difference(AttenuationSource::corrected, kOneVoxel)});
+       difference(AttenuationSource::swept, kOneVoxel), difference(AttenuationSource::interpolated, kOrdered),
+       difference(AttenuationSource::interpolated, kOneVoxel), difference(AttenuationSource::stored, kOrdered),
+       difference(AttenuationSource::stored, kOneVoxel)});
 }
 
 }  // namespace

@@ -57,7 +57,9 @@ double shadowPsnr(const Samples& samples, const AttenuationGrid& grid, const std
 
 void addShadows(Table& table, const Scene& scene, const TableOptions& options) {
   if (table.head.empty())
-    table.head = {"volume", "lamp", "nearest of 26", "stored", "corrected", "corrected, near field traced", "swept"};
+    table.head = {"volume",       "lamp",      "nearest of 26",
+                  "interpolated", "corrected", "stored: corrected, near field traced",
+                  "swept"};
   std::vector<Classified> ofCode;
   for (uint32_t code = 0; code <= scene.grid.coding.largest; ++code)
     ofCode.push_back(scene.transfer.at(scene.grid.coding.decode(code)));

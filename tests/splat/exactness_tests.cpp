@@ -78,7 +78,7 @@ Scene wallInMist() {
 TEST(Exactness, EverySourceOfAttenuationAndHiddenCells) {
   const Scene scene = wallInMist();
   const Camera camera = randomViews(scene.bounds(), 1, {47, 35}).front();
-  for (const AttenuationSource source : {AttenuationSource::stored, AttenuationSource::corrected,
+  for (const AttenuationSource source : {AttenuationSource::interpolated, AttenuationSource::stored,
                                          AttenuationSource::quotient, AttenuationSource::swept}) {
     expectOneResult(scene, camera, Formula::normalised, Footprint::cell, source, Cull::hidden);
     expectOneResult(scene, camera, Formula::normalised, Footprint::kernel, source, Cull::hidden);
@@ -90,7 +90,7 @@ TEST(Cull, HiddenCellsAreNotMissed) {
   const Scene scene = wallInMist();
   for (const Camera& camera : randomViews(scene.bounds(), 6, {83, 61})) {
     for (const AttenuationSource source :
-         {AttenuationSource::stored, AttenuationSource::corrected, AttenuationSource::swept}) {
+         {AttenuationSource::interpolated, AttenuationSource::stored, AttenuationSource::swept}) {
       SplatOptions options;
       options.attenuation = source;
       const SplatResult all = splatScene(scene, camera, options);
@@ -137,7 +137,7 @@ Scene blockyScene() {
 }
 
 TEST(Exactness, CellsInPerspective) {
-  for (const AttenuationSource source : {AttenuationSource::stored, AttenuationSource::swept}) {
+  for (const AttenuationSource source : {AttenuationSource::interpolated, AttenuationSource::swept}) {
     const Scene scene = blockyScene();
     for (const Camera& camera : randomViews(scene.bounds(), 2, {97, 64})) {
       expectOneResult(scene, camera, Formula::normalised, Footprint::cell, source);

@@ -177,7 +177,7 @@ TEST(Levels, SweptAttenuationAndOtherColoursAreRefused) {
   options.lodPixels = 1.0;
   options.attenuation = AttenuationSource::swept;
   EXPECT_THROW(splatScene(scene, camera, options), InputError);
-  options.attenuation = AttenuationSource::stored;
+  options.attenuation = AttenuationSource::interpolated;
   TransferFunction recoloured = scene.transfer;
   recoloured.points[1].srgb = {0.3, 0.3, 0.4};
   Splatter splatter(*scene.file, recoloured, Backend::cpu);

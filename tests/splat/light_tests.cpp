@@ -118,7 +118,7 @@ TEST(Lights, ShadowFallsAwayFromTheLamp) {
   camera.orthographicHeight = 40.0;
   camera.imageSize = {160, 150};
   // The ball's centre is 12.5 above the floor; a lamp at 45 degrees from +x throws the shadow that far to -x.
-  for (const AttenuationSource source : {AttenuationSource::stored, AttenuationSource::swept}) {
+  for (const AttenuationSource source : {AttenuationSource::interpolated, AttenuationSource::swept}) {
     for (const double side : {1.0, -1.0}) {
       SplatOptions options;
       options.attenuation = options.lightAttenuation = source;
@@ -158,7 +158,7 @@ TEST(Lights, ALampWithoutShadowsOrShadingChangesNothing) {
   const Image unlit = resolve(splatScene(scene, camera, options).sums, Formula::normalised);
   options.lighting.ambient = 0.0f;
   // Along x the single sheet of voxels has nothing before it, and `voxel` attenuation leaves out the voxel itself.
-  options.lightAttenuation = AttenuationSource::stored;
+  options.lightAttenuation = AttenuationSource::interpolated;
   options.lighting.lights = {{true, {1.0, 0.0, 0.0}, glm::vec3(1.0f)}};
   const Image lit = resolve(splatScene(scene, camera, options).sums, Formula::normalised);
   for (size_t i = 0; i < lit.pixels.size(); ++i)
