@@ -30,8 +30,8 @@ enum class Footprint {
 
 /// Where attenuation towards the eye, or towards a lamp, comes from.
 enum class AttenuationSource {
-  automatic,  ///< pinned, if the file has a pin that is the target; else stored, with an attenuation file and the
-              ///< target outside the volume; else swept
+  automatic,     ///< pinned, if the file has a pin that is the target; else stored, with an attenuation file and the
+                 ///< target outside the volume; else swept
   interpolated,  ///< among the 26 directions of the file, which run on to the outside even if the target is inside
   stored,    ///< the same, corrected by a sweep of a coarse copy of the volume, and right before a voxel traced (which
              ///< takes the values of the whole volume, and is left out where blocks of coarser levels are drawn)
