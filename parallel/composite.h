@@ -4,7 +4,8 @@
 // Sums of whole quanta are exact, so any tree of additions gives the same bits. The tree is radix-k (Peterka, Goodell,
 // Ross, Shen, Thakur 2009): in every round a group of k ranks splits the part of the image that it has in common, each
 // adds up one piece of it, and in the end every rank owns one band, which goes to rank 0. A rank sends at most its
-// image once and its band, however many ranks there are, and of both only tiles in which there is anything.
+// image once and its band, however many ranks there are, and of both only tiles in which there is anything. Parts that
+// are all covered travel without being copied.
 #pragma once
 
 #include <cstdint>
@@ -31,7 +32,7 @@ struct CompositeTraffic {
 /// Images that are larger are added a slice at a time: it bounds buffers and messages. Pixels.
 inline constexpr size_t kCompositeSlice = size_t(1) << 23;
 
-/// Adds images of one size. Holds buffers of about twice the image, or of a slice of it.
+/// Adds images of one size. Holds a buffer of the size of the image, or of a slice of it, rank 0 two.
 class Compositor {
  public:
   /// `ranks` must outlive this. Not collective.
@@ -48,7 +49,18 @@ class Compositor {
  private:
   using Range = TilePacking::Range;
   static Range piece(Range whole, int pieces, int index);
+  /// What a rank has of a slice after all rounds: its digit in each picks a piece of what is left.
+  Range bandOf(Range slice, int rank) const;
+  std::span<float> valuesOf(Image& image, Range range) const;
   bool addSlice(Image& image, Range slice, std::span<const float> limits);
+  /// One round: gives the piece of `whole` that this rank has added up.
+  Range exchangePieces(Image& image, Range whole, int round, int stride);
+  /// On rank 0, of what all others send.
+  void gatherBands(Image& image, Range slice);
+  /// As it is if all of it is covered, else packed into `space`. Gives the words that took. Image and space must stay
+  /// until the request is done.
+  size_t send(Image& image, Range range, int to, int round, uint32_t* space, MPI_Request* request);
+  void countReceived(const MPI_Status& status);
 
   const Ranks& ranks_;
   TilePacking packing_;

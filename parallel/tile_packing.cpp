@@ -4,6 +4,14 @@
 
 namespace freevoxel {
 
+void addWords(std::span<float> values, const uint32_t* words) {
+  for (size_t i = 0; i < values.size(); ++i) {
+    float value;
+    std::memcpy(&value, words + i, sizeof value);
+    values[i] += value;
+  }
+}
+
 bool allBelow(std::span<const float> values, std::span<const float> limits) {
   bool below = true;
   for (size_t i = 0; i < values.size(); i += limits.size()) {
@@ -19,39 +27,37 @@ size_t TilePacking::tileValues(size_t tile) const {
 
 bool TilePacking::isCovered(const Image& image, size_t tile) const {
   const float* values = image.pixels.data() + tile * kCompositeTile * channels_;
-  const size_t count = tileValues(tile);
-  uint32_t bits = 0;
-  for (size_t i = 0; i < count; ++i) {
-    uint32_t word;
-    std::memcpy(&word, values + i, sizeof word);
-    bits |= word;
+  // A tile that is covered mostly shows it at once.
+  constexpr size_t kAtOnce = 32;
+  for (size_t first = 0, count = tileValues(tile); first < count; first += kAtOnce) {
+    uint32_t bits = 0;
+    for (size_t i = first; i < std::min(first + kAtOnce, count); ++i) {
+      uint32_t word;
+      std::memcpy(&word, values + i, sizeof word);
+      bits |= word;
+    }
+    if (bits != 0) return true;
   }
-  return bits != 0;
+  return false;
 }
 
-template <class Take>
-size_t TilePacking::packEach(const Image& image, Range range, uint32_t* words, Take&& take) const {
+bool TilePacking::allCovered(const Image& image, Range range) const {
+  for (size_t tile = range.first; tile < range.last; ++tile) {
+    if (!isCovered(image, tile)) return false;
+  }
+  return true;
+}
+
+size_t TilePacking::pack(const Image& image, Range range, uint32_t* words) const {
   std::fill_n(words, maskWords(range), 0u);
   uint32_t* out = words + maskWords(range);
   for (size_t tile = range.first; tile < range.last; ++tile) {
     if (!isCovered(image, tile)) continue;
-    const std::span<const float> values(image.pixels.data() + tile * kCompositeTile * channels_, tileValues(tile));
-    take(values);
     words[(tile - range.first) / 32] |= 1u << (tile - range.first) % 32;
-    std::memcpy(out, values.data(), values.size_bytes());
-    out += values.size();
+    std::memcpy(out, image.pixels.data() + tile * kCompositeTile * channels_, tileValues(tile) * sizeof(float));
+    out += tileValues(tile);
   }
   return size_t(out - words);
-}
-
-size_t TilePacking::pack(const Image& image, Range range, uint32_t* words) const {
-  return packEach(image, range, words, [](std::span<const float>) {});
-}
-
-size_t TilePacking::pack(const Image& image, Range range, uint32_t* words, std::span<const float> limits,
-                         bool& below) const {
-  return packEach(image, range, words,
-                  [&](std::span<const float> values) { below = allBelow(values, limits) && below; });
 }
 
 template <class Put>
@@ -67,11 +73,7 @@ void TilePacking::unpackEach(Image& image, Range range, const uint32_t* words, P
 
 void TilePacking::add(Image& image, Range range, const uint32_t* words) const {
   unpackEach(image, range, words, [](float* values, const uint32_t* from, size_t count) {
-    for (size_t i = 0; i < count; ++i) {
-      float value;
-      std::memcpy(&value, from + i, sizeof value);
-      values[i] += value;
-    }
+    addWords({values, count}, from);
   });
 }
 

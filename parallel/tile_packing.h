@@ -1,6 +1,7 @@
 // Images as messages: only tiles in which there is anything travel.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <span>
@@ -34,11 +35,16 @@ class TilePacking {
   size_t mostWords(Range range) const { return maskWords(range) + range.size() * size_t(kCompositeTile) * channels_; }
 
   bool isCovered(const Image& image, size_t tile) const;
+  /// Whether every tile of a range is: then its values can travel as they are.
+  bool allCovered(const Image& image, Range range) const;
+  /// The values of a range: where they begin among those of the image, and how many they are.
+  size_t firstValue(Range range) const { return range.first * size_t(kCompositeTile) * channels_; }
+  size_t valueCount(Range range) const {
+    return range.size() == 0 ? 0 : std::min(firstValue({range.last, range.last}), values()) - firstValue(range);
+  }
 
   /// Gives the number of words written to `words`.
   size_t pack(const Image& image, Range range, uint32_t* words) const;
-  /// The same, and clears `below` unless all values are below their channels' limits.
-  size_t pack(const Image& image, Range range, uint32_t* words, std::span<const float> limits, bool& below) const;
   /// Adds what was packed; tiles without a bit stay.
   void add(Image& image, Range range, const uint32_t* words) const;
   /// Puts what was packed in the place of what is there; tiles without a bit stay.
@@ -46,13 +52,14 @@ class TilePacking {
 
  private:
   size_t tileValues(size_t tile) const;
-  template <class Take>
-  size_t packEach(const Image& image, Range range, uint32_t* words, Take&& take) const;
   template <class Put>
   void unpackEach(Image& image, Range range, const uint32_t* words, Put&& put) const;
 
   size_t channels_, pixels_, tiles_;
 };
+
+/// Adds as many floats, given as the words of a message.
+void addWords(std::span<float> values, const uint32_t* words);
 
 /// Whether every value of channel c is below limits[c]; channel fastest.
 bool allBelow(std::span<const float> values, std::span<const float> limits);
