@@ -44,6 +44,7 @@ void reportLevels(const SplatStatistics& statistics, Session& session) {
   session.statistics["emptyBlocks"] = statistics.emptyBlocks;
   session.statistics["blocksOfLevel"] = statistics.blocksOfLevel;
   session.statistics["splatsOfLevel"] = statistics.splatsOfLevel;
+  session.statistics["volumeBytes"] = statistics.volumeBytes;
   if (statistics.glBytes > 0) session.statistics["glBytes"] = statistics.glBytes;
 }
 

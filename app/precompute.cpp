@@ -18,6 +18,7 @@
 #include "parallel/distributed_precompute.h"
 #include "splat/pinned_attenuation.h"
 #include "volume/read_volume.h"
+#include "volume/resample.h"
 #include "volume/transfer_presets.h"
 
 namespace freevoxel {
@@ -28,6 +29,7 @@ struct PrecomputeCommandOptions {
   std::string input, output, transfer;
   VolumeOptions raw;
   std::optional<uint64_t> memory;
+  std::optional<int> resolution;
   std::vector<Pin> pins;
   PrecomputeOptions precompute;
 };
@@ -113,6 +115,9 @@ Outcome precomputeCommand(PrecomputeCommandOptions options, const CLI::App& comm
     if (transfer.isLabels) options.precompute.classification = labelClassification(options, command);
   };
   if (options.memory) options.precompute.memoryBytes = withoutProgram(*options.memory);
+  if (options.resolution && (options.memory || session.ranks().rankCount() > 1)) {
+    throw UsageError("--resolution holds the whole volume in one process: leave --memory and the launcher out");
+  }
   if (session.ranks().rankCount() > 1) {
     if (!options.pins.empty()) throw UsageError("pins are swept by one process: precompute without the launcher");
     const auto source = openVolume(options.input, options.raw);
@@ -131,9 +136,14 @@ Outcome precomputeCommand(PrecomputeCommandOptions options, const CLI::App& comm
     makeFile(*source, transfer, options, session);
     return Outcome::done;
   }
-  const Volume volume = session.timed("read", [&] { return readVolume(options.input, options.raw); });
+  Volume volume = session.timed("read", [&] { return readVolume(options.input, options.raw); });
   const TransferFunction transfer = chooseTransfer(options.transfer, volume);
   classify(transfer);
+  if (options.resolution) {
+    volume.header.labels = volume.header.labels || transfer.isLabels;
+    volume =
+        session.timed("resample", [&] { return resampled(volume, resampledDims(volume.header, *options.resolution)); });
+  }
   makeFile(volume, transfer, options, session);
   return Outcome::done;
 }
@@ -196,6 +206,10 @@ Command addPrecompute(CLI::App& program, CommonOptions& common) {
       "take no more memory than this, 64M or more, for the whole run: the volume is read in slices, and its codes "
       "wait on the disk beside the output; K, M and G are powers of 1024 (default: the volume is held in memory)",
       parseMemory);
+  addParsed<std::optional<int>>(
+      *command, "--resolution", options->resolution, "N",
+      fmt::format("voxels along the longest edge, 1 to {}: the volume is resampled (default: its own)", kMaxDim),
+      [](std::string_view text) { return std::optional<int>(int(parseWhole(text, 1, kMaxDim))); });
   addPinOption(
       *command, "--pin-light", options->pins, false,
       "also store attenuation swept towards a point of world space: of a lamp that stays there, or an eye; may "

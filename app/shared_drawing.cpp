@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <cmath>
@@ -54,11 +55,12 @@ Partition parsePartitionName(std::string_view text) {
 
 void addShareOptions(CLI::App& command, ShareOptions& options) {
   const std::string group = "Several processes (mpirun -n N freevoxel ...; the bits are the same for any number)";
-  addParsed<Partition>(command, "--partition", options.partition, "round-robin|hilbert|slab|random:SEED|file:F",
-                       "which rank draws which block: in turn, those with most to draw first; runs of the Hilbert "
-                       "curve; slabs across z; at random; or as a text file says, a rank for every block (default "
-                       "round-robin)",
-                       parsePartitionName)
+  addParsed<Partition>(
+      command, "--partition", options.partition, "round-robin|hilbert|slab|random:SEED|file:F",
+      "which rank draws which block: in turn, back and forth, those with most to draw first; runs of the Hilbert "
+      "curve; slabs across z; at random; or as a text file says, a rank for every block (default "
+      "round-robin)",
+      parsePartitionName)
       ->group(group);
   addChoice<CompositeMethod>(command, "--composite", options.composite,
                              {{"tiles", CompositeMethod::tiles}, {"reduce", CompositeMethod::reduce}},
@@ -162,6 +164,7 @@ SplatResult SharedDrawing::render(const Camera& camera, const SplatOptions& opti
     total_.addCounts(done);
     total_.attenuationSeconds += done.attenuationSeconds;
     total_.lightSeconds += done.lightSeconds;
+    total_.volumeBytes = std::max(total_.volumeBytes, done.volumeBytes);
     total_.setupSeconds += done.setupSeconds;
     total_.drawSeconds += done.drawSeconds;
     return {std::move(sums), done};
@@ -188,6 +191,7 @@ void SharedDrawing::report() {
                                        {"sentBytes", tiles            ? compositor_.traffic().sentBytes
                                                      : ranks.isRoot() ? 0
                                                                       : reducedBytes_},
+                                       {"volumeBytes", total_.volumeBytes},
                                        {"peakMemoryBytes", peakMemoryBytes()}};
   ranks.agree();
   nlohmann::ordered_json all = nlohmann::ordered_json::array();

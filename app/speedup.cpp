@@ -18,7 +18,6 @@
 #include "app/shared_drawing.h"
 #include "base/error.h"
 #include "hierarchy/attenuation_file.h"
-#include "hierarchy/value_grid.h"
 #include "parallel/composite_cost.h"
 #include "splat/splat.h"
 
@@ -49,7 +48,7 @@ struct Row {
   int blockEdge = kBlockEdge;
   uint64_t blocks = 0;
   // Mean over largest of a rank: means over views, and the worst view.
-  double balance = 0.0, worstBalance = 1.0;              ///< of splats: visible cells in view, or kernels
+  double balance = 0.0, worstBalance = 1.0;  ///< of splats: visible voxels of blocks in view, or kernels drawn
   double balancePieces = 0.0, worstBalancePieces = 1.0;  ///< of what is traced: pieces of rays, or fragments
   // Sums over views.
   double oneSeconds = 0.0;      ///< one rank alone
@@ -141,15 +140,15 @@ bool sameBits(const Image& a, const Image& b) {
 
 class Experiment {
  public:
-  Experiment(const SpeedupOptions& options, const ValueGrid& grid, const AttenuationFile& file, Session& session)
-      : options_(options), grid_(grid), file_(file), session_(session) {
-    views_ = viewsOf(makeCamera(options.camera, worldBounds(grid.placement, grid.dims)), options.views);
+  Experiment(const SpeedupOptions& options, const AttenuationFile& file, Session& session)
+      : options_(options), file_(file), session_(session) {
+    views_ = viewsOf(makeCamera(options.camera, worldBounds(file.placement(), file.dims())), options.views);
     if (!options.countOnly && !together()) rates_ = measureCompositeRates(options.camera.imageSize, kSumChannels);
   }
 
   std::vector<Row> run() {
     for (const int edge : options_.blockEdges) {
-      Splatter splatter(grid_, &file_, file_.transfer(), options_.backend, edge);
+      Splatter splatter(file_, file_.transfer(), options_.backend, edge);
       const std::vector<SharedBlock> blocks = sharedBlocks(splatter.blocks());
       const size_t firstRow = rows_.size();
       const std::vector<int> counts = together() ? std::vector<int>{session_.ranks().rankCount()} : options_.ranks;
@@ -314,7 +313,6 @@ class Experiment {
   }
 
   const SpeedupOptions& options_;
-  const ValueGrid& grid_;
   const AttenuationFile& file_;
   Session& session_;
   std::vector<Camera> views_;
@@ -414,8 +412,7 @@ Outcome speedup(const SpeedupOptions& options, const CLI::App& command, Session&
   }
   const AttenuationFile file(options.input);
   expectSameOnAllRanks(session.ranks(), file.identity(), options.input);
-  const ValueGrid grid = session.timed("read", [&] { return valueGrid(file); });
-  Experiment experiment(options, grid, file, session);
+  Experiment experiment(options, file, session);
   const std::vector<Row> rows = session.timed("measure", [&] { return experiment.run(); });
   if (!session.ranks().isRoot()) return Outcome::done;
   nlohmann::ordered_json json = {

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstdint>
 #include <glm/vec3.hpp>
+#include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "hierarchy/attenuation_file.h"
@@ -23,7 +25,25 @@ using CornerCodes = std::array<uint16_t, 8>;
 std::vector<uint16_t> absentBrickCodes(glm::ivec3 bricks, const std::vector<uint8_t>& stored,
                                        const std::vector<CornerCodes>& corners);
 
-/// The same from a file, which reads all of its codes.
-std::vector<uint16_t> absentBrickCodes(const AttenuationFile& file);
+/// The eight codes of a stored brick of a file. Throws InputError if it is damaged.
+CornerCodes cornerCodes(const AttenuationFile& file, size_t brick);
+
+/// The same codes, of one brick after the other as they are needed: only the stored bricks that they come from are
+/// read.
+class AbsentBricks {
+ public:
+  /// Looks at the directory alone. `file` must outlive it.
+  explicit AbsentBricks(const AttenuationFile& file);
+  /// Reads what the codes of these bricks (voxel / edge) come from; stored ones are passed over. Throws InputError.
+  void read(std::span<const glm::ivec3> positions);
+  /// Of a brick that was among those read and is not stored.
+  uint16_t code(glm::ivec3 position) const;
+
+ private:
+  const AttenuationFile& file_;
+  glm::ivec3 bricks_;
+  std::vector<uint64_t> sources_;
+  std::unordered_map<uint64_t, CornerCodes> corners_;  ///< of stored bricks, by linear index
+};
 
 }  // namespace freevoxel

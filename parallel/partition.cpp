@@ -112,9 +112,12 @@ std::vector<int> dealBlocks(std::span<const SharedBlock> blocks, const Partition
     } else if (partition.kind == Partition::Kind::slab) {
       std::stable_sort(level.begin(), level.end(), [&](size_t a, size_t b) { return blocks[a].z < blocks[b].z; });
     }
+    const auto ranks = size_t(rankCount);
     for (size_t i = 0; i < level.size(); ++i) {
-      owners[level[i]] = partition.kind == Partition::Kind::roundRobin ? int(i % size_t(rankCount))
-                                                                       : int(i * size_t(rankCount) / level.size());
+      const size_t round = i / ranks, turn = i % ranks;
+      owners[level[i]] = partition.kind != Partition::Kind::roundRobin ? int(i * ranks / level.size())
+                         : round % 2 == 0                              ? int(turn)
+                                                                       : int(ranks - 1 - turn);
     }
   }
   return owners;

@@ -13,7 +13,8 @@ namespace freevoxel {
 /// How blocks are dealt to ranks. It changes no bit of the picture, only who works how long.
 struct Partition {
   enum class Kind {
-    roundRobin,  ///< one by one in turn, those with most work first
+    roundRobin,  ///< one by one in turn, those with most work first, back and forth: 0 1 2 2 1 0 0 1 2, so that
+                 ///< nobody always has the largest
     hilbert,     ///< runs of the Hilbert curve, as many blocks for each rank
     slab,        ///< slabs across z, as many blocks for each rank
     random,      ///< every block to a rank drawn at random

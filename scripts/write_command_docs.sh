@@ -53,8 +53,9 @@ Every command takes `--stats FILE.json` and writes what it did; of these keys th
 | `rows` | of `speedup`, one entry per number of ranks, partition and block edge: `ranks`, `partition`, `block`, `blocks`; `balance` (mean over largest splats of a rank, mean over views), `worstBalance` (of the worst view), `balancePieces`, `worstBalancePieces` (of pieces of rays; with `--count` of pixels that blocks cover); seconds of a view: `oneSeconds` (one rank), `slowestSeconds` (the slowest of several), `compositeSeconds`; `sentBytes` (most by a rank); `speedup`, `efficiency`, `speedupWithComposite`, `efficiencyWithComposite` |
 | `real`, `views`, `clock`, `replicatedSeconds`, `compositeRates` | of `speedup`: whether ranks were processes; views; what clock; attenuation and light, which every rank works out alike before it draws, of a view; what the composite of virtual ranks is reckoned with |
 | `partition`, `balance`, `balancePieces` | of several ranks: how blocks were dealt; mean over largest splats, and pieces of rays, of a rank |
-| `ranks` | of several ranks, one entry each: `rank`, `host`, `seconds` (`attenuation`, `light`, `setup`, `draw`, `composite`), `blocks`, `splats`, `fragments`, `pieces`, `sentBytes` (by the composite), `peakMemoryBytes`, all frames together; what stands outside of it are sums (`blocks`, `splats`, `fragments`) or rank 0's |
+| `ranks` | of several ranks, one entry each: `rank`, `host`, `seconds` (`attenuation`, `light`, `setup`, `draw`, `composite`), `blocks`, `splats`, `fragments`, `pieces`, `sentBytes` (by the composite), `volumeBytes`, `peakMemoryBytes`, all frames together; what stands outside of it are sums (`blocks`, `splats`, `fragments`) or rank 0's |
 | `identical`, `psnr`, `ssim`, `rms`, `maxError`, `differingBytes`, `coveredPixels` | of `compare` |
+| `volumeBytes` | most that values, attenuation and light of the volume took at once: of all of it, or with stored attenuation of the bricks that were needed |
 | `peakMemoryBytes` | largest resident memory of the process |
 | `warnings` | what the user was warned of |
 TEXT

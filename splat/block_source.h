@@ -43,6 +43,9 @@ class BlockSource {
   virtual void prepare(std::span<const VisibleBlock> blocks) = 0;
   /// Of a block that was among those prepared last. From many threads.
   virtual void gather(const VisibleBlock& block, BlockSamples& samples) const = 0;
+  /// Most that values, attenuation and light took in memory at once: of the whole volume, or of the bricks that were
+  /// needed.
+  virtual uint64_t volumeBytes() const = 0;
   /// Whether voxels have light of their own.
   virtual bool lit() const = 0;
 };

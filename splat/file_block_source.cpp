@@ -10,7 +10,6 @@
 #include "base/error.h"
 #include "base/first_exception.h"
 #include "base/grid.h"
-#include "hierarchy/absent_bricks.h"
 #include "precompute/hilbert.h"
 #include "precompute/stored_bricks.h"
 #include "splat/grid_block_source.h"
@@ -31,7 +30,7 @@ constexpr float kOpaqueExtinction = 1.0f;
 
 }  // namespace
 
-FileBlockSource::FileBlockSource(const AttenuationFile& file, View view, std::vector<uint16_t>& absent, int edge,
+FileBlockSource::FileBlockSource(const AttenuationFile& file, View view, std::optional<AbsentBricks>& absent, int edge,
                                  uint64_t memoryBytes)
     : file_(file), view_(std::move(view)), absent_(absent), edge_(edge), memoryBytes_(memoryBytes) {
   checkEqual(view_.lamps.size(), view_.lighting == nullptr ? 0 : view_.lighting->lighting().lights.size(),
@@ -149,12 +148,14 @@ void FileBlockSource::prepare(std::span<const VisibleBlock> blocks) {
   const bool shaded = lit() && view_.lighting->shaded();
   const std::vector<Place> valued = shaded ? withNeighbours(needed) : needed;
   std::vector<std::pair<Place, Brick*>> withoutValues, withoutAttenuation;
-  bool finest = false;
+  std::vector<glm::ivec3> finest;
   for (const Place& place : valued) {
     Brick& brick = bricks_[key(place)];
     brick.lastUsed = call_;
-    if (brick.codes.empty() && brick.matter.empty()) withoutValues.emplace_back(place, &brick);
-    finest = finest || place.level == 0;
+    if (brick.codes.empty() && brick.matter.empty()) {
+      withoutValues.emplace_back(place, &brick);
+      if (place.level == 0) finest.push_back(place.position);
+    }
   }
   for (const Place& place : needed) {
     Brick& brick = bricks_[key(place)];
@@ -163,7 +164,8 @@ void FileBlockSource::prepare(std::span<const VisibleBlock> blocks) {
   for (const auto& [place, brick] : withoutAttenuation) {
     if (const auto stored = file_.findLevelBrick(place.level, place.position)) file_.prefetch(place.level, *stored);
   }
-  if (finest && absent_.empty()) absent_ = absentBrickCodes(file_);
+  if (!finest.empty() && !absent_) absent_.emplace(file_);
+  if (!finest.empty()) absent_->read(finest);
   FirstException failure;
   // In two rounds, since shading looks at neighbours' values.
   const auto readAll = [&](const std::vector<std::pair<Place, Brick*>>& bricks, auto read) {
@@ -182,6 +184,7 @@ void FileBlockSource::prepare(std::span<const VisibleBlock> blocks) {
   readAll(withoutAttenuation, &FileBlockSource::readAttenuation);
   for (const auto& [place, brick] : withoutAttenuation)
     held_ += brick->bytes();
+  mostHeld_ = std::max(mostHeld_, held_);
   file_.checkIntact();
   forget();
 }
@@ -201,11 +204,10 @@ void FileBlockSource::forget() {
 }
 
 void FileBlockSource::readValues(const Place& place, Brick& brick) const {
-  const int edge = file_.brickEdge();
   const auto stored = file_.findLevelBrick(place.level, place.position);
   if (place.level == 0) {
     if (!stored) {
-      brick.codes.assign(brickVoxels(), absent_[linearIndex(place.position, brickDims(file_.dims(), edge))]);
+      brick.codes.assign(brickVoxels(), absent_->code(place.position));
       return;
     }
     const BrickView view = file_.brick(*stored, DirectionSet(0));

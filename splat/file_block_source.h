@@ -8,6 +8,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "hierarchy/absent_bricks.h"
 #include "splat/block_source.h"
 #include "splat/coarse_volume.h"
 #include "splat/stored_attenuation.h"
@@ -39,15 +40,16 @@ class FileBlockSource final : public BlockSource {
     bool white = false;                       ///< levels from 1 on are drawn without their colours
   };
 
-  /// All must outlive the source. `absent`: codes of bricks that are not stored (absentBrickCodes), made when they are
-  /// first needed. `memoryBytes`: that bricks may take in memory; what one call of prepare() needs is held in any case.
-  FileBlockSource(const AttenuationFile& file, View view, std::vector<uint16_t>& absent, int edge,
+  /// All must outlive the source. `absent`: of the same file, made when it is first needed. `memoryBytes`: that bricks
+  /// may take in memory; what one call of prepare() needs is held in any case.
+  FileBlockSource(const AttenuationFile& file, View view, std::optional<AbsentBricks>& absent, int edge,
                   uint64_t memoryBytes);
 
   int edge() const override { return edge_; }
   glm::ivec3 dims(int level) const override { return file_.levelDims(level); }
   void prepare(std::span<const VisibleBlock> blocks) override;
   void gather(const VisibleBlock& block, BlockSamples& samples) const override;
+  uint64_t volumeBytes() const override { return mostHeld_; }
   bool lit() const override { return view_.lighting != nullptr; }
 
   /// Bytes of the bricks that one block needs at most.
@@ -96,13 +98,14 @@ class FileBlockSource final : public BlockSource {
 
   const AttenuationFile& file_;
   View view_;
-  std::vector<uint16_t>& absent_;
+  std::optional<AbsentBricks>& absent_;
   int edge_;
   uint64_t memoryBytes_;
   std::vector<Level> levels_;
   std::unordered_map<uint64_t, Brick> bricks_;
-  uint64_t held_ = 0;  ///< bytes of bricks_
-  uint64_t call_ = 0;  ///< of prepare()
+  uint64_t held_ = 0;      ///< bytes of bricks_
+  uint64_t mostHeld_ = 0;  ///< the most that was
+  uint64_t call_ = 0;      ///< of prepare()
 };
 
 }  // namespace freevoxel

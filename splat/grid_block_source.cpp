@@ -53,6 +53,12 @@ glm::ivec3 GridBlockSource::dims(int level) const {
   return grid_.dims;
 }
 
+uint64_t GridBlockSource::volumeBytes() const {
+  const uint64_t attenuations = attenuation_ != nullptr ? attenuation_->values.size() : 0;
+  return grid_.codes.size() * sizeof(uint16_t) + attenuations * sizeof(uint16_t) +
+         light_.values.size() * sizeof(LightValue);
+}
+
 void GridBlockSource::gather(const VisibleBlock& block, BlockSamples& samples) const {
   checkEqual(block.level, 0, "level of a grid");
   samples.matter.clear();

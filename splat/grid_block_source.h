@@ -17,6 +17,7 @@ class GridBlockSource final : public BlockSource {
   glm::ivec3 dims(int level) const override;
   void prepare(std::span<const VisibleBlock> /*blocks*/) override {}
   void gather(const VisibleBlock& block, BlockSamples& samples) const override;
+  uint64_t volumeBytes() const override;
   bool lit() const override { return !light_.empty(); }
 
  private:

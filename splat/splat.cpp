@@ -110,7 +110,7 @@ struct Splatter::State {
   std::optional<ValueGrid> own;
   std::optional<VisibleCubes> cubes;
   std::optional<CoarseVolume> coarse;
-  std::vector<uint16_t> absent;                   ///< codes of bricks that the file lacks
+  std::optional<AbsentBricks> absent;             ///< bricks that the file lacks
   std::vector<std::vector<VisibleBlock>> levels;  ///< blocks of each level; at first of the finest only
 
   /// What of a frame does not depend on the quantum.
@@ -472,6 +472,7 @@ Sums Splatter::draw(float quantum, std::span<const uint8_t> share, Progress& pro
   progress.begin("splatting", drawn.size(), "blocks");
   Sums sums = drawFrameBlocks(drawn, quantum, progress);
   progress.end();
+  statistics.volumeBytes = frame.source->volumeBytes();
   return sums;
 }
 

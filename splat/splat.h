@@ -87,6 +87,7 @@ struct SplatStatistics {
   std::string attenuation;       ///< towards the eye: name of the source
   std::string lightAttenuation;  ///< the same towards lamps, of the last one; empty without any
   uint64_t glBytes = 0;          ///< most that buffers and textures took at once
+  uint64_t volumeBytes = 0;      ///< of BlockSource
   double attenuationSeconds = 0, lightSeconds = 0, setupSeconds = 0, drawSeconds = 0;
 
   /// Adds what another drawing counted, of blocks, splats, fragments and pieces.
@@ -113,7 +114,7 @@ std::string_view attenuationSourceName(AttenuationSource source);
 
 /// What there is to draw in one block.
 struct BlockWork {
-  uint64_t cells = 0;   ///< visible ones, if the block is in view
+  uint64_t cells = 0;   ///< VisibleBlock::visibleCells, if the block is in view
   uint64_t pixels = 0;  ///< of its bounding rectangle on the image
 };
 

@@ -110,7 +110,21 @@ TEST_F(RanksOfProgram, DrawTheSameBits) {
   EXPECT_GT(two["ranks"][1]["blocks"], 0);
   EXPECT_GT(two["ranks"][1]["sentBytes"], 0);
   EXPECT_GT(two["ranks"][1]["peakMemoryBytes"], 0);
+  EXPECT_GT(two["ranks"][1]["volumeBytes"], 0);
   EXPECT_EQ(two["partition"], "round-robin");
+}
+
+// With stored attenuation a rank reads the bricks of its own blocks, and what touches them.
+TEST_F(RanksOfProgram, ReadWhatTheyDraw) {
+  const std::string call = std::string("render cloud.fvx --attenuation stored") + kView;
+  run(call + "-o alone.exr --sums alone_sums.exr --stats alone.json");
+  // Blocks of 32 along x: 0 and 1 of them are each other's neighbours, the third is 6 voxels wide.
+  runRanks(2, call + "-o each.exr --sums each_sums.exr --stats each.json --partition hilbert");
+  expectIdentical("alone_sums.exr", "each_sums.exr");
+  const auto all = readJson(folder + "/alone.json")["volumeBytes"].get<uint64_t>();
+  EXPECT_GT(all, uint64_t(70 * 45 * 37));
+  for (const nlohmann::json& rank : readJson(folder + "/each.json")["ranks"])
+    EXPECT_LT(rank["volumeBytes"], all);
 }
 
 TEST_F(RanksOfProgram, TurnTogether) {
