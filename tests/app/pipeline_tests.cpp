@@ -66,6 +66,18 @@ TEST_F(Pipeline, infoTellsOfTheAttenuationFile) {
   EXPECT_NE(run("info voxel.fvx").output.find("freevoxel precompute cloud.nrrd"), std::string::npos);
 }
 
+// The box stays: 1.5 x 7.7 x 29.7, cut into voxels as near to cubes as it goes.
+TEST_F(Pipeline, precomputeResamples) {
+  run("precompute cloud.nrrd --transfer t.json --resolution 12 -o coarse.fvx");
+  const auto json = nlohmann::json::parse(run("info coarse.fvx --json").output);
+  EXPECT_EQ(json["dims"], (nlohmann::json{1, 3, 12}));
+  EXPECT_NEAR(json["spacing"][0], 1.5, 1e-12);
+  EXPECT_NEAR(json["spacing"][1], 7.7 / 3, 1e-12);
+  EXPECT_NEAR(json["spacing"][2], 29.7 / 12, 1e-12);
+  expectRefusal(folder, words("precompute cloud.nrrd --transfer t.json --resolution 12 --memory 64M -o no.fvx"), 2,
+                "--resolution");
+}
+
 TEST_F(Pipeline, verifyFindsAFlippedByte) {
   EXPECT_NE(run("verify cloud.fvx").output.find("ok"), std::string::npos);
   EXPECT_NE(run("verify cloud.nrrd").output.find("ok"), std::string::npos);
