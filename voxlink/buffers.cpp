@@ -24,6 +24,18 @@ BrickGrid brickGrid(int edge, glm::ivec3 low, glm::ivec3 high) {
   return grid;
 }
 
+void writeHeader(uint32_t* header, int edge, uint32_t first, const uint16_t* masks) {
+  std::fill_n(header, shared::headerWords(edge), 0u);
+  header[0] = first;
+  uint32_t before = 0;
+  for (int column = 0; column < edge * edge; ++column) {
+    const int bit = column * edge;
+    if (bit % 64 == 0) header[shared::startWord(edge, bit)] |= before << shared::startShift(bit);
+    header[shared::maskWord(bit)] |= uint32_t(masks[column]) << (bit & 31);
+    before += uint32_t(std::popcount(masks[column]));
+  }
+}
+
 std::optional<uint32_t> VoxLinkBuffers::find(glm::ivec3 voxel) const {
   for (int axis = 0; axis < 3; ++axis) {
     if (voxel[axis] < grid.low[axis] || voxel[axis] >= grid.high[axis]) return std::nullopt;
@@ -31,11 +43,9 @@ std::optional<uint32_t> VoxLinkBuffers::find(glm::ivec3 voxel) const {
   const uint32_t* brick = header(voxel / grid.edge);
   if (brick == nullptr) return std::nullopt;
   const glm::ivec3 local = voxel % grid.edge;
-  const uint32_t list = brick[1 + local.y * grid.edge + local.x];
-  const uint32_t mask = shared::listMask(list);
-  if ((mask >> local.z & 1u) == 0) return std::nullopt;
-  const uint32_t before = uint32_t(std::popcount(mask & ((1u << local.z) - 1u)));
-  return fragments[size_t(brick[0]) + shared::listStart(list) + before];
+  const int column = local.y * grid.edge + local.x;
+  if ((listMask(brick, grid.edge, column) >> local.z & 1u) == 0) return std::nullopt;
+  return fragments[storedVoxel(brick, grid.edge, column * grid.edge + local.z)];
 }
 
 std::vector<uint8_t> storedCodes(const TransferFunction& transfer, const ValueCoding& coding, double threshold) {
@@ -169,17 +179,15 @@ VoxLinkBuffers buildBuffers(const ValueGrid& grid, const std::vector<uint8_t>& s
     std::array<uint16_t, 256> masks;
     columnMasks(grid, stored, brick * brickEdge, brickEdge, masks.data());
     uint32_t* header = buffers.brickHeaders.data() + (buffers.header(brick) - buffers.brickHeaders.data());
-    header[0] = firstFragment[size_t(at)];
-    uint32_t start = 0;
+    size_t fragment = firstFragment[size_t(at)];
+    writeHeader(header, brickEdge, uint32_t(fragment), masks.data());
     for (int column = 0; column < brickEdge * brickEdge; ++column) {
-      header[1 + column] = shared::listOf(masks[size_t(column)], start);
       for (uint32_t mask = masks[size_t(column)]; mask != 0; mask &= mask - 1) {
         const glm::ivec3 voxel =
             brick * brickEdge + glm::ivec3(column % brickEdge, column / brickEdge, std::countr_zero(mask));
         const uint64_t voxelIndex = linearIndex(voxel, grid.dims);
-        buffers.fragments[size_t(header[0]) + start] =
+        buffers.fragments[fragment++] =
             shared::fragmentOf(grid.codes[voxelIndex], voxelNormal(grid, gradientMatrix, voxel));
-        ++start;
       }
     }
   }

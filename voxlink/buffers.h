@@ -43,6 +43,20 @@ BrickGrid brickGrid(int edge, glm::ivec3 low, glm::ivec3 high);
 /// Throws InputError unless edge is 4, 8 or 16.
 void checkBrickEdge(int edge);
 
+/// Of a brick's header (shaders/shared/voxlink.h): the filled voxels of a list.
+inline uint32_t listMask(const uint32_t* header, int edge, int column) {
+  return shared::listMask(header[shared::maskWord(column * edge)], edge, column);
+}
+/// Number of a stored voxel, told by its bit: those of the brick before it and of all bricks before.
+inline size_t storedVoxel(const uint32_t* header, int edge, int bit) {
+  const uint32_t start = header[shared::startWord(edge, bit)] >> shared::startShift(bit) & 0xffffu;
+  const uint32_t word = header[shared::maskWord(bit)], other = (bit & 32) != 0 ? header[shared::maskWord(bit) - 1] : 0;
+  const uint64_t below = uint64_t(word & ((1u << (bit & 31)) - 1u)) << 32 | other;
+  return size_t(header[0]) + start + size_t(std::popcount(below));
+}
+/// Writes a brick's header from the masks of its edge^2 lists.
+void writeHeader(uint32_t* header, int edge, uint32_t first, const uint16_t* masks);
+
 /// Which voxels are filled, and where what they hold starts: stored voxels are counted in the order of headers, lists
 /// and z.
 /// Invariant: brickWords has one word per 32 bricks of the grid; brickHeaders has occupied bricks * headerWords(edge)
@@ -115,10 +129,9 @@ void forEachStoredVoxel(const BrickLists& buffers, F&& f) {
                                                      int(at / (int64_t(grid.count.x) * grid.count.y)));
     const uint32_t* header = buffers.header(brick);
     if (header == nullptr) continue;
+    size_t fragment = header[0];
     for (int column = 0; column < grid.edge * grid.edge; ++column) {
-      const uint32_t list = header[1 + column];
-      size_t fragment = size_t(header[0]) + shared::listStart(list);
-      for (uint32_t mask = shared::listMask(list); mask != 0; mask &= mask - 1) {
+      for (uint32_t mask = listMask(header, grid.edge, column); mask != 0; mask &= mask - 1) {
         f(fragment++, brick * grid.edge + glm::ivec3(column % grid.edge, column / grid.edge, std::countr_zero(mask)));
       }
     }

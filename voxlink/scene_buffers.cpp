@@ -300,13 +300,13 @@ SceneBuffers buildSceneBuffers(const SceneVoxels& scene, int brickEdge, uint64_t
     const size_t brick = occupied[n];
     const glm::ivec3 origin = originOf(brick);
     uint32_t* const header = buffers.brickHeaders.data() + n * words;
-    std::array<uint32_t, 256> masks{};
+    std::array<uint16_t, 256> masks{};
     uint64_t voxel = totals[brick].voxels, fragment = totals[brick].fragments;
-    header[0] = uint32_t(voxel);
+    const uint32_t first = uint32_t(voxel);
     const Entry* const end = entries.data() + starts[brick + 1];
     for (const Entry* entry = entries.data() + starts[brick]; entry != end;) {
       const uint32_t place = entry->place, column = place / uint32_t(brickEdge);
-      masks[column] |= 1u << place % uint32_t(brickEdge);
+      masks[column] = uint16_t(masks[column] | 1u << place % uint32_t(brickEdge));
       buffers.voxels[voxel++] = uint32_t(fragment);
       while (entry != end && entry->place == place) {
         const Entry* last = entry;
@@ -316,11 +316,7 @@ SceneBuffers buildSceneBuffers(const SceneVoxels& scene, int brickEdge, uint64_t
         entry = last;
       }
     }
-    uint32_t start = 0;
-    for (size_t column = 0; column + 1 < words; ++column) {
-      header[1 + column] = shared::listOf(masks[column], start);
-      start += uint32_t(std::popcount(masks[column]));
-    }
+    writeHeader(header, brickEdge, first, masks.data());
   }
   return buffers;
 }

@@ -90,10 +90,8 @@ class DirectionSweep {
         const uint32_t* header = buffers_.header(brick);
         if (header == nullptr) continue;
         for (int column = 0; column < edge * edge; ++column) {
-          const uint32_t list = header[1 + column], mask = shared::listMask(list);
-          if ((mask >> localZ & 1u) == 0) continue;
-          const uint32_t rank = uint32_t(std::popcount(mask & ((1u << localZ) - 1u)));
-          f(size_t(header[0]) + shared::listStart(list) + rank, brick.x * edge + column % edge - grid.low.x,
+          if ((listMask(header, edge, column) >> localZ & 1u) == 0) continue;
+          f(storedVoxel(header, edge, column * edge + localZ), brick.x * edge + column % edge - grid.low.x,
             brick.y * edge + column / edge - grid.low.y);
         }
       }

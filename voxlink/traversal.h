@@ -70,10 +70,10 @@ void traverse(const BrickLists& buffers, glm::dvec3 origin, glm::dvec3 direction
       continue;
     }
 
-    const uint32_t list = header[1 + (voxel.y - first.y) * edge + (voxel.x - first.x)];
+    const int column = (voxel.y - first.y) * edge + (voxel.x - first.x);
     const int localZ = voxel.z - first.z;
     // Voxels of the list from here on, the way the ray goes.
-    const uint32_t mask = shared::listMask(list);
+    const uint32_t mask = listMask(header, edge, column);
     const uint32_t ahead = up ? mask >> localZ << localZ : mask & ((2u << localZ) - 1u);
     const double exitX = planeAt(0, direction.x > 0.0 ? voxel.x + 1 : voxel.x);
     const double exitY = planeAt(1, direction.y > 0.0 ? voxel.y + 1 : voxel.y);
@@ -88,9 +88,7 @@ void traverse(const BrickLists& buffers, glm::dvec3 origin, glm::dvec3 direction
         nextZ = up ? first.z + bit + 1 : first.z + bit - 1;
         voxel.z = first.z + bit;
         const double to = std::min(exit, exitZ);
-        const uint32_t before = uint32_t(std::popcount(mask & ((1u << bit) - 1u)));
-        const size_t fragment = size_t(header[0]) + shared::listStart(list) + before;
-        if (!visit(fragment, voxel, enter, std::max(enter, to))) return;
+        if (!visit(storedVoxel(header, edge, column * edge + bit), voxel, enter, std::max(enter, to))) return;
         t = std::max(t, enter);
       }
     }

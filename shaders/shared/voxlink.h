@@ -1,9 +1,9 @@
 // The VoxLink buffers, in GLSL and C++ alike (papers/voxlink section 4.1; docs/voxlink.md draws them).
 //
 //   brickWords      one per 32 bricks of the grid, x fastest: which are occupied, and how many are before them
-//   brickHeaders    per occupied brick headerWords(edge) words: its first fragment, then edge^2 lists, x fastest.
-//                   A list holds a column of voxels along z, the predominant axis: a mask of the voxels that are
-//                   filled and where their fragments start
+//   brickHeaders    per occupied brick headerWords(edge) words: its first fragment; a bit per voxel, whether it is
+//                   filled; per 64 of these bits 16 more, how many of the brick's voxels are filled before them.
+//                   A list is a column of voxels along z, the predominant axis; lists follow each other x fastest
 //   fragmentBuffer  one word per filled voxel, lists one after the other: a code of the value and a normal
 //   materialBuffer  per code: linear colour and extinction
 #ifndef FREEVOXEL_SHADERS_SHARED_VOXLINK_H
@@ -57,21 +57,27 @@ SHARED_CONSTANT float kOpaqueEnough = 0.000244140625f;  // 2^-12
 // Directions with components smaller than this are taken as this: no division by 0.
 SHARED_CONSTANT float kLeastComponent = 1e-12f;
 
-// Words of a brick's header.
+// Words of a brick's header: one, masks, starts. Bit `column * edge + z` of the masks is a voxel's, column = y * edge + x.
+SHARED_FUNCTION int maskWords(int edge) {
+  return edge * edge * edge / 32;
+}
 SHARED_FUNCTION int headerWords(int edge) {
-  return edge * edge + 1;
+  return 1 + maskWords(edge) + (maskWords(edge) + 3) / 4;
 }
-
-// A list: the lower half says which of its voxels are filled, the upper half where, from the brick's first fragment on,
-// theirs start.
-SHARED_FUNCTION uint listOf(uint mask, uint start) {
-  return mask | start << 16;
+// Where in a header a voxel's bit is,
+SHARED_FUNCTION int maskWord(int bit) {
+  return 1 + (bit >> 5);
 }
-SHARED_FUNCTION uint listMask(uint list) {
-  return list & 0xffffu;
+// and how many voxels are filled before its 64: the word, and how far that word is to be shifted down.
+SHARED_FUNCTION int startWord(int edge, int bit) {
+  return 1 + maskWords(edge) + (bit >> 7);
 }
-SHARED_FUNCTION uint listStart(uint list) {
-  return list >> 16;
+SHARED_FUNCTION int startShift(int bit) {
+  return (bit >> 6 & 1) * 16;
+}
+// The mask of a list from the word that holds it; bit z is the voxel at z.
+SHARED_FUNCTION uint listMask(uint word, int edge, int column) {
+  return word >> (column * edge & 31) & ((1u << edge) - 1u);
 }
 
 // A fragment: code in the lower half, normal in the upper.

@@ -10,6 +10,19 @@ layout(location = 2) uniform ivec3 gridFirst;
 layout(location = 3) uniform ivec3 gridCount;
 layout(location = 4) uniform int edge;
 
+// Of the brick whose header starts there: the filled voxels of a list.
+uint columnMask(uint header, int column) {
+  return listMask(brickHeaders[header + uint(maskWord(column * edge))], edge, column);
+}
+// Number of a stored voxel, told by its bit: those of the brick before it and of all bricks before.
+uint storedVoxel(uint header, int bit) {
+  uint start = brickHeaders[header + uint(startWord(edge, bit))] >> startShift(bit) & 0xffffu;
+  uint word = header + uint(maskWord(bit));
+  uint before = uint(bitCount(brickHeaders[word] & ((1u << (bit & 31)) - 1u)));
+  if ((bit & 32) != 0) before += uint(bitCount(brickHeaders[word - 1u]));
+  return brickHeaders[header] + start + before;
+}
+
 // Whether a brick of the grid is occupied, and where its header starts.
 bool findBrick(ivec3 brick, out uint header) {
   ivec3 b = brick - gridFirst;

@@ -11,6 +11,7 @@ layout(location = 4) uniform mat3 gradientMatrix;
 layout(location = 5) uniform float surfaceGradient;
 
 shared uint filled[64];
+shared uint headerPart[161];  // headerWords(16) are the most
 
 float difference(ivec3 voxel, int axis) {
   ivec3 low = voxel, high = voxel;
@@ -41,11 +42,15 @@ void main() {
     barrier();
   }
   uint at = filled[local] - own;
-  uint header = start.x * uint(headerWords(edge));
-  if (local == 0u) brickHeaders[header] = start.y;
+  int words = headerWords(edge);
+  for (int word = int(local); word < words; word += 64)
+    headerPart[word] = word == 0 ? start.y : 0u;
+  barrier();
   for (int column = first; column < end; ++column) {
     uint mask = columnMask(origin, column);
-    brickHeaders[header + 1u + uint(column)] = listOf(mask, at);
+    int bit = column * edge;
+    atomicOr(headerPart[maskWord(bit)], mask << (bit & 31));
+    if (bit % 64 == 0) atomicOr(headerPart[startWord(edge, bit)], at << startShift(bit));
     for (; mask != 0u; mask &= mask - 1u) {
       ivec3 voxel = origin + ivec3(column % edge, column / edge, findLSB(mask));
       vec3 gradient = gradientMatrix * vec3(difference(voxel, 0), difference(voxel, 1), difference(voxel, 2));
@@ -54,4 +59,7 @@ void main() {
       ++at;
     }
   }
+  barrier();
+  for (int word = int(local); word < words; word += 64)
+    brickHeaders[start.x * uint(words) + uint(word)] = headerPart[word];
 }

@@ -13,6 +13,7 @@ layout(location = 0) uniform ivec3 size;  // in bricks
 layout(location = 1) uniform int edge;
 
 shared int low[3], high[3];
+shared uint headerPart[161];  // headerWords(16) are the most
 
 void main() {
   uvec3 group = gl_WorkGroupID;
@@ -24,19 +25,20 @@ void main() {
     low[local] = 0x7fffffff;
     high[local] = 0;
   }
-  barrier();
   uint first = rank * uint(edge * edge * edge);
-  uint header = rank * uint(headerWords(edge));
   uint voxels = table[first].x;
-  if (local == 0u) {
-    brickHeaders[header] = voxels;
-    placeBricks[rank] = brick;
-  }
+  int words = headerWords(edge);
+  for (int word = int(local); word < words; word += 64)
+    headerPart[word] = word == 0 ? voxels : 0u;
+  if (local == 0u) placeBricks[rank] = brick;
+  barrier();
   for (int column = int(local); column < edge * edge; column += 64) {
     uint at = first + uint(column * edge), mask = 0u;
     for (int z = 0; z < edge; ++z)
       mask |= table[at + uint(z) + 1u].x > table[at + uint(z)].x ? 1u << z : 0u;
-    brickHeaders[header + 1u + uint(column)] = listOf(mask, table[at].x - voxels);
+    int bit = column * edge;
+    atomicOr(headerPart[maskWord(bit)], mask << (bit & 31));
+    if (bit % 64 == 0) atomicOr(headerPart[startWord(edge, bit)], (table[at].x - voxels) << startShift(bit));
     if (mask == 0u) continue;
     ivec3 corner = ivec3(group) * edge + ivec3(column % edge, column / edge, 0);
     ivec3 from = corner + ivec3(0, 0, findLSB(mask)), to = corner + ivec3(1, 1, findMSB(mask) + 1);
@@ -46,6 +48,8 @@ void main() {
     }
   }
   barrier();
+  for (int word = int(local); word < words; word += 64)
+    brickHeaders[rank * uint(words) + uint(word)] = headerPart[word];
   if (local < 3u) {
     atomicMin(box[local], low[local]);
     atomicMax(box[3u + local], high[local]);

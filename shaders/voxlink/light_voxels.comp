@@ -37,9 +37,8 @@ void main() {
   uint header;
   if (!findBrick(brick, header)) return;
   for (int column = int(gl_LocalInvocationIndex); column < edge * edge; column += 64) {
-    uint list = brickHeaders[header + 1u + uint(column)];
-    uint fragment = brickHeaders[header] + listStart(list);
-    for (uint mask = listMask(list); mask != 0u; mask &= mask - 1u) {
+    uint fragment = storedVoxel(header, column * edge);
+    for (uint mask = columnMask(header, column); mask != 0u; mask &= mask - 1u) {
       vec3 place = lengthFromIndex * vec3(brick * edge + ivec3(column % edge, column / edge, findLSB(mask)));
       vec3 normal;
       float surface;

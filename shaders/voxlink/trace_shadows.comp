@@ -20,10 +20,8 @@ void main() {
   uint header;
   int column = firstColumn + int(gl_LocalInvocationIndex);
   if (!findBrick(brick, header) || column >= edge * edge) return;
-  uint list = brickHeaders[header + 1u + uint(column)];
-  uint mask = listMask(list);
-  if ((mask >> localZ & 1u) == 0u) return;
-  uint fragment = brickHeaders[header] + listStart(list) + uint(bitCount(mask & ((1u << localZ) - 1u)));
+  if ((columnMask(header, column) >> localZ & 1u) == 0u) return;
+  uint fragment = storedVoxel(header, column * edge + localZ);
   ivec3 voxel = brick * edge + ivec3(column % edge, column / edge, localZ);
 
   vec3 towards = directional != 0 ? lamp : lamp - vec3(voxel);

@@ -88,9 +88,9 @@ bool walkOn(inout Walk w, out WalkStep s) {
   }
 
   bool up = w.direction.z > 0.0;
-  uint list = brickHeaders[header + 1u + uint((w.voxel.y - first.y) * edge + (w.voxel.x - first.x))];
+  int column = (w.voxel.y - first.y) * edge + (w.voxel.x - first.x);
   int localZ = w.voxel.z - first.z;
-  uint mask = listMask(list);
+  uint mask = columnMask(header, column);
   uint ahead = up ? mask >> localZ << localZ : mask & ((2u << localZ) - 1u);
   float exitX = planeAt(w, 0, w.direction.x > 0.0 ? w.voxel.x + 1 : w.voxel.x);
   float exitY = planeAt(w, 1, w.direction.y > 0.0 ? w.voxel.y + 1 : w.voxel.y);
@@ -106,7 +106,7 @@ bool walkOn(inout Walk w, out WalkStep s) {
       w.voxel.z = first.z + bit;
       w.t = max(w.t, enter);
       s.hit = true;
-      s.fragment = brickHeaders[header] + listStart(list) + uint(bitCount(mask & ((1u << bit) - 1u)));
+      s.fragment = storedVoxel(header, column * edge + bit);
       s.voxel = w.voxel;
       s.from = enter;
       s.to = max(enter, min(exitXY, exitZ));
