@@ -142,16 +142,12 @@ VoxLinkBuffers buildBuffers(const ValueGrid& grid, const std::vector<uint8_t>& s
   buffers.grid = brickGrid(brickEdge, low, high);
   const BrickGrid& bricks = buffers.grid;
   const int64_t count = int64_t(bricks.bricks());
-  const auto positionOf = [&](int64_t at) {
-    return bricks.first + glm::ivec3(int(at % bricks.count.x), int(at / bricks.count.x % bricks.count.y),
-                                     int(at / (int64_t(bricks.count.x) * bricks.count.y)));
-  };
 
   std::vector<uint32_t> voxels(static_cast<size_t>(count));
 #pragma omp parallel for schedule(dynamic, 64)
   for (int64_t at = 0; at < count; ++at) {
     std::array<uint16_t, 256> masks;
-    voxels[size_t(at)] = columnMasks(grid, stored, positionOf(at) * brickEdge, brickEdge, masks.data());
+    voxels[size_t(at)] = columnMasks(grid, stored, bricks.position(uint64_t(at)) * brickEdge, brickEdge, masks.data());
   }
 
   buffers.brickWords.resize(size_t(count + 31) / 32);
@@ -175,7 +171,7 @@ VoxLinkBuffers buildBuffers(const ValueGrid& grid, const std::vector<uint8_t>& s
 #pragma omp parallel for schedule(dynamic, 64)
   for (int64_t at = 0; at < count; ++at) {
     if (voxels[size_t(at)] == 0) continue;
-    const glm::ivec3 brick = positionOf(at);
+    const glm::ivec3 brick = bricks.position(uint64_t(at));
     std::array<uint16_t, 256> masks;
     columnMasks(grid, stored, brick * brickEdge, brickEdge, masks.data());
     uint32_t* header = buffers.brickHeaders.data() + (buffers.header(brick) - buffers.brickHeaders.data());

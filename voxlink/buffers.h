@@ -36,6 +36,10 @@ struct BrickGrid {
   uint64_t bricks() const { return voxelCount(count); }
   /// Of a brick in the grid, x fastest.
   uint64_t index(glm::ivec3 brick) const { return linearIndex(brick - first, count); }
+  glm::ivec3 position(uint64_t index) const {
+    return first + glm::ivec3(int(index % uint64_t(count.x)), int(index / uint64_t(count.x) % uint64_t(count.y)),
+                              int(index / (uint64_t(count.x) * uint64_t(count.y))));
+  }
 };
 
 /// The smallest grid round a box that is not empty. Throws InputError unless edge is 4, 8 or 16.
@@ -125,8 +129,7 @@ void forEachStoredVoxel(const BrickLists& buffers, F&& f) {
   const BrickGrid& grid = buffers.grid;
 #pragma omp parallel for schedule(dynamic, 64)
   for (int64_t at = 0; at < int64_t(grid.bricks()); ++at) {
-    const glm::ivec3 brick = grid.first + glm::ivec3(int(at % grid.count.x), int(at / grid.count.x % grid.count.y),
-                                                     int(at / (int64_t(grid.count.x) * grid.count.y)));
+    const glm::ivec3 brick = grid.position(uint64_t(at));
     const uint32_t* header = buffers.header(brick);
     if (header == nullptr) continue;
     size_t fragment = header[0];

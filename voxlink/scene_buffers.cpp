@@ -286,9 +286,7 @@ SceneBuffers buildSceneBuffers(const SceneVoxels& scene, int brickEdge, uint64_t
   for (int64_t at = 0; at < gridBricks; ++at) {
     BrickWord& word = buffers.brickWords[size_t(at) >> 5];
     if ((at & 31) == 0) word = {0, uint32_t(occupied.size())};
-    const glm::ivec3 brick = grid.first + glm::ivec3(int(at % grid.count.x), int(at / grid.count.x % grid.count.y),
-                                                     int(at / (int64_t(grid.count.x) * grid.count.y)));
-    const size_t index = size_t(linearIndex(brick, voxeliser.bricks()));
+    const size_t index = size_t(linearIndex(grid.position(uint64_t(at)), voxeliser.bricks()));
     if (starts[index] == starts[index + 1]) continue;
     word.occupied |= 1u << (at & 31);
     occupied.push_back(index);

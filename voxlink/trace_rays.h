@@ -3,22 +3,13 @@
 
 #include <cstdint>
 #include <span>
-#include <vector>
 
 #include "base/camera.h"
 #include "base/image.h"
-#include "base/light.h"
 #include "base/progress.h"
 #include "voxlink/buffers.h"
-#include "voxlink/shadows.h"
 
 namespace freevoxel {
-
-/// Light that every stored voxel sends to the eye, packed (shared::packLight): ambient, and of every lamp its colour
-/// times its share times its shading. Shading differs from `render`'s only in that the normal is the stored one.
-/// Throws InputError for colours or directions that make no sense.
-std::vector<uint32_t> lightVoxels(const VoxLinkBuffers& buffers, const Lighting& lighting, const LightShares& shares,
-                                  const Camera& camera);
 
 /// Premultiplied linear RGBA. Every voxel is a box of its own colour and extinction, met exactly (what ray casting with
 /// nearest neighbours tends to with small steps). `light` is lightVoxels, or empty: voxels shine with their own colour.

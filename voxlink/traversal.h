@@ -40,12 +40,17 @@ void traverse(const BrickLists& buffers, glm::dvec3 origin, glm::dvec3 direction
   const auto follow = [&](int axis, int low, int high) {
     voxel[axis] = std::clamp(int(std::floor(origin[axis] + t * direction[axis])), low, high);
   };
-  const int edge = grid.edge;
+  const int edge = grid.edge, shift = std::countr_zero(uint32_t(edge));
   const bool up = direction.z > 0.0;
+  glm::ivec3 brick(-1);
+  const uint32_t* header = nullptr;
   for (;;) {
-    const glm::ivec3 brick = voxel / edge;
+    const glm::ivec3 here(voxel.x >> shift, voxel.y >> shift, voxel.z >> shift);
+    if (here != brick) {
+      brick = here;
+      header = buffers.header(brick);
+    }
     const glm::ivec3 first = brick * edge;
-    const uint32_t* header = buffers.header(brick);
     if (header == nullptr) {
       double nearest = INFINITY;
       int axis = 0;

@@ -5,6 +5,7 @@
 
 #include "base/error.h"
 #include "voxlink/gl_buffers.h"
+#include "voxlink/light_voxels.h"
 #include "voxlink/trace_rays.h"
 
 namespace freevoxel {
@@ -152,7 +153,7 @@ Image VoxLink::trace(const Camera& camera, Progress& progress) {
       state.onGpu->light(state.lighting, camera);
       glFinish();
     } else {
-      state.light = lightVoxels(state.buffers, state.lighting, state.shares, camera);
+      lightVoxels(state.buffers, state.lighting, state.shares, camera, state.light);
     }
     state.lit = state.lighting.shading == Shading::none;
   }

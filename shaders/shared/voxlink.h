@@ -57,7 +57,8 @@ SHARED_CONSTANT float kOpaqueEnough = 0.000244140625f;  // 2^-12
 // Directions with components smaller than this are taken as this: no division by 0.
 SHARED_CONSTANT float kLeastComponent = 1e-12f;
 
-// Words of a brick's header: one, masks, starts. Bit `column * edge + z` of the masks is a voxel's, column = y * edge + x.
+// Words of a brick's header: one, masks, starts. Bit `column * edge + z` of the masks is a voxel's, column = y * edge +
+// x.
 SHARED_FUNCTION int maskWords(int edge) {
   return edge * edge * edge / 32;
 }

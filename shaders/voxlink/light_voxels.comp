@@ -1,5 +1,5 @@
 // The light that every stored voxel sends to the eye: ambient, and of every lamp what reaches it times its shading
-// (voxlink/trace_rays.h, lightVoxels). One group per brick of the grid.
+// (voxlink/light_voxels.h). One group per brick of the grid.
 layout(local_size_x = 64) in;
 
 #include "shaders/voxlink/brick_grid.glsl"

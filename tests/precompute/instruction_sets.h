@@ -1,33 +1,5 @@
-// Running the same code with every instruction set.
+// The instruction sets that precompute/ is compiled for.
 #pragma once
 
-#include <cstdint>
-#include <vector>
-
-// Like the code under test.
 #define HWY_WANT_AVX3_DL
-#include <hwy/highway.h>
-
-namespace freevoxel::test {
-
-/// Chooses among the instruction sets that this machine has; undone at the end.
-class InstructionSet {
- public:
-  explicit InstructionSet(int64_t target) { choose(target); }
-  ~InstructionSet() { choose(0); }
-
- private:
-  static void choose(int64_t target) {
-    hwy::SetSupportedTargetsForTest(target);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
-
-inline std::vector<int64_t> instructionSets() {
-  std::vector<int64_t> sets;
-  for (int64_t rest = hwy::SupportedTargets() & HWY_TARGETS; rest != 0; rest &= rest - 1)
-    sets.push_back(rest & -rest);
-  return sets;
-}
-
-}  // namespace freevoxel::test
+#include "tests/support/instruction_sets.h"
