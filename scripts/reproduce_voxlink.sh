@@ -4,42 +4,16 @@
 # DATA_FOLDER holds volumes/ and vdb/; docs/results/voxlink is the default for tables and figures. Frame rates are means
 # over VIEWS views of a full turn about y and as many of one about x. Without a GPU the CPU backend traces few views.
 #   VIEWS=360 RESOLUTIONS="256 512 1024" SIZE=1000x1000 BACKEND=gl override what it chooses.
-set -euo pipefail
-program=$(realpath "$1")
 data=$(realpath "$2")
-top=$(cd "$(dirname "$0")/.." && pwd)
+. "$(dirname "$0")/voxlink_measuring.sh"
 out=${3:-$top/docs/results/voxlink}
-transfers=$top/examples/transfer
-scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
 mkdir -p "$out"
-
-value() { # KEY of the last statistics
-  sed -n "s/^ *\"$1\": \"\{0,1\}\([^\",]*[^\",]\).*/\1/p" "$scratch/stats.json" | head -n 1
-}
-frames() { # seconds of every frame, one a line
-  sed -n '/"frameSeconds"/,/\]/s/^ *\([0-9][0-9.e-]*\),\{0,1\}$/\1/p' "$scratch/stats.json"
-}
-trace() { # arguments of freevoxel trace
-  "$program" trace "$@" --quiet --stats "$scratch/stats.json"
-}
-
-# Whether there is a GPU.
-"$program" generate cloud --dims 24,20,28 -o "$scratch/probe.nrrd" --quiet
-trace "$scratch/probe.nrrd" --transfer "$transfers/cloud.json" --size 32x32 -o "$scratch/probe.png"
-backend=${BACKEND:-$(value backend)}
-renderer=$(value glRenderer)
-if [[ $backend == gl ]]; then
-  views=${VIEWS:-360} resolutions=${RESOLUTIONS:-256 512 1024}
-  machine=${renderer:-OpenGL}
-else
-  views=${VIEWS:-2} resolutions=${RESOLUTIONS:-256 512}
-  machine="no GPU: plain C++ on $(value threads) threads, few views"
-fi
+views=${VIEWS:-$((few ? 2 : 360))}
+resolutions=${RESOLUTIONS:-256 512$( ((few)) || echo " 1024")}
 size=${SIZE:-1000x1000}
 view=(--orbit 0,0 --fov 30)
 
-for r in $resolutions; do
+for r in $(printf '%s\n' 256 $resolutions | sort -nu); do
   for kind in kronecker sphere; do
     "$program" generate "$kind" --dims "$r,$r,$r" -o "$scratch/$kind$r.nrrd" --quiet
   done
@@ -47,7 +21,9 @@ done
 
 table=$out/table3.md
 {
-  echo "Made by scripts/reproduce_voxlink.sh ($machine): $size, mean of $((2 * views)) views of full turns about y and x."
+  echo "Made by scripts/reproduce_voxlink.sh ($machine): $size, mean of $((2 * views)) views of full turns about y"
+  echo "and x. Load average of the machine at the start: $(load) (of $(nproc) cores)."
+  echo
   echo "The paper has $((2 * 360)) views on a Quadro K6000; its kingfisher and mouse are not public, so three other sparse"
   echo "volumes stand in for them, resampled."
   echo
@@ -65,7 +41,7 @@ measure() { # NAME RESOLUTION BRICK ARGUMENTS...
   local name=$1 resolution=$2 brick=$3
   shift 3
   echo "$name $resolution [$brick]" >&2
-  trace "$@" --brick "$brick" --backend "$backend" --turn "$views" "${view[@]}" --size "$size" -o "$scratch/picture.png"
+  trace "$@" --brick "$brick" --backend "$backend" --turn "$views" "${view[@]}" --size "$size"
   printf '| %s | %s [%s] | ' "$name" "$resolution" "$brick"
   echo "$(value storedVoxels) $(value voxels) $(value occupiedBricks) $(value bricks) $(value bufferBytes) \
     $(value bytesPerStoredVoxel) $(value framesPerSecond) $(value raysPerSecond) $(value build)" |
@@ -87,39 +63,39 @@ for r in $resolutions; do
 done >>"$table"
 
 # Steps per pass: only the GPU's passes are bounded by them. On a software renderer a smaller picture.
-steps=$out/steps.md
+small=$size
+((few)) && small=250x250
 {
-  small=$size
-  [[ $backend == gl ]] || small=250x250
-  echo
-  echo "| steps per pass | passes | fps, aneurism [8], $small |"
+  echo "| steps per pass | passes | fps, kronecker 256 [8], $small |"
   echo "|---|---|---|"
   for n in 64 256 512 1024; do
-    trace "${aneurism[@]}" --backend gl --steps "$n" --turn "$views" "${view[@]}" --size "$small" -o "$scratch/picture.png"
+    trace "$scratch/kronecker256.nrrd" --transfer "$transfers/kronecker.json" --backend gl --steps "$n" --turn "$views" "${view[@]}" --size "$small"
     printf '| %s | %s | %.2f |\n' "$n" "$(value passes)" "$(value framesPerSecond)"
   done
   echo
   echo "OpenGL here: $(value glRenderer)"
-} >"$steps"
+} >"$out/steps.md"
 
-# Each further light: frames of a turn, and what is done once for the lamps.
-lights=$out/lights.md
+# Lamps: frames of a turn, and what is done once for the lamps.
 lamps=(--light-direction=1,0.2,0.8 --light-direction=-1,0.5,0.3 --light-direction=0.2,1,0.3 --light-direction=0.2,-0.4,-1)
+whole=("$raw/carp.nii.gz" --transfer "$transfers/carp.json")
 {
-  echo "| lights | shadows | frame, s | once for the lamps, s |"
-  echo "|---|---|---|---|"
-  for n in 0 1 2 3 4; do
-    for shadows in attenuation rays; do
-      [[ $n == 0 && $shadows == rays ]] && continue
-      shading=()
-      ((n == 0)) || shading=(--shading phong)
-      trace "${carp[@]}" --backend "$backend" --shadows "$shadows" "${lamps[@]:0:n}" "${shading[@]}" --turn "$views" \
-        "${view[@]}" --size "$size" -o "$scratch/picture.png"
-      printf '| %s | %s | %.3f | %.2f |\n' "$n" "$([[ $n == 0 ]] && echo - || echo "$shadows")" \
-        "$(value framesPerSecond | awk '{print 1 / $1}')" "$(value shadows)"
-    done
+  echo "The whole carp, $size, mean of $((4 * views)) views, \`--shading phong\`; $machine, load average $(load) at the start."
+  echo
+  echo "| lights | shadows | frame, s | of the frame without | once for the lamps, s |"
+  echo "|---|---|---|---|---|"
+  without=
+  for how in "0 -" "1 attenuation" "2 attenuation" "3 attenuation" "4 attenuation" "1 rays" "4 rays"; do
+    read -r n shadows <<<"$how"
+    lit=()
+    ((n == 0)) || lit=(--shading phong --shadows "$shadows" "${lamps[@]:0:n}")
+    trace "${whole[@]}" --backend "$backend" "${lit[@]}" --turn $((2 * views)) "${view[@]}" --size "$size"
+    frame=$(value framesPerSecond | awk '{print 1 / $1}')
+    without=${without:-$frame}
+    echo "$n $shadows $frame $without $(value shadows)" |
+      awk '{printf "| %s | %s | %.3f | %.2f | %.2f |\n", $1, $2, $3, $3 / $4, $5}'
   done
-} >"$lights"
+} >"$out/lights.md"
 
 # Figure 7: how the frame rate depends on the angle, of a sphere, which looks the same from everywhere.
 turn=${TURN:-$((views < 24 ? 12 : views))}
@@ -128,7 +104,7 @@ if command -v gnuplot >/dev/null; then
   for r in $resolutions; do
     for brick in 4 8 16; do
       trace "$scratch/sphere$r.nrrd" --transfer "$transfers/sphere.json" --brick "$brick" --backend "$backend" --turn "$turn" \
-        "${view[@]}" --size 400x400 -o "$scratch/picture.png"
+        "${view[@]}" --size 400x400
       frames | awk -v n="$turn" '{print (NR - 1) * 360 / n, 1 / $1}' >"$scratch/sphere$r.$brick"
       curves+=("'$scratch/sphere$r.$brick' with linespoints title '$r [$brick]'")
     done
@@ -147,17 +123,17 @@ PLOT
 fi
 
 # Figure 8 and the shadows: pictures.
-picture=(--size 420x420 --backend "$backend")
+picture=(--size 420x420)
 lit=(--shading phong --ambient 0.2)
-trace "$scratch/kronecker${resolutions%% *}.nrrd" --transfer "$transfers/kronecker.json" "${picture[@]}" --orbit 30,20 \
+draw "$scratch/kronecker256.nrrd" --transfer "$transfers/kronecker.json" "${picture[@]}" --orbit 30,20 \
   -o "$scratch/kronecker.png"
-trace "${carp[@]}" "${picture[@]}" --eye 760,340,420 --up 0,0,1 --fov 40 "${lit[@]}" --light-direction=1,0.2,0.8 \
+draw "${carp[@]}" "${picture[@]}" --eye 760,340,420 --up 0,0,1 --fov 40 "${lit[@]}" --light-direction=1,0.2,0.8 \
   -o "$scratch/carp.png"
-trace "${aneurism[@]}" "${picture[@]}" --orbit 25,15 --fov 20 "${lit[@]}" --light-direction=0,1,1 -o "$scratch/aneurism.png"
-trace "${smoke[@]}" "${picture[@]}" --orbit 30,10 --light-direction=1,0.6,0.3 --ambient 0.3 -o "$scratch/smoke.png"
+draw "${aneurism[@]}" "${picture[@]}" --orbit 25,15 --fov 20 "${lit[@]}" --light-direction=0,1,1 -o "$scratch/aneurism.png"
+draw "${smoke[@]}" "${picture[@]}" --orbit 30,10 --light-direction=1,0.6,0.3 --ambient 0.3 -o "$scratch/smoke.png"
 "$program" sheet "$scratch"/{kronecker,carp,aneurism,smoke}.png --columns 4 -o "$out/figure8.png"
 for shadows in none attenuation rays; do
-  trace "${smoke[@]}" "${picture[@]}" --orbit 30,10 --light-direction=1,0.6,0.3 --ambient 0.3 --shadows "$shadows" \
+  draw "${smoke[@]}" "${picture[@]}" --orbit 30,10 --light-direction=1,0.6,0.3 --ambient 0.3 --shadows "$shadows" \
     -o "$scratch/shadows_$shadows.png"
 done
 "$program" sheet "$scratch"/shadows_{none,attenuation,rays}.png --columns 3 -o "$out/shadows.png"

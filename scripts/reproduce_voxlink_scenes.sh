@@ -5,36 +5,15 @@
 # docs/results/voxlink is the default. Frame rates are means over VIEWS views of a full turn about y and as many of one
 # about x. Without a GPU the CPU backend traces few and small views; the tables say so.
 #   VIEWS=360 RESOLUTIONS="256 512 1024" SIZE=1000x1000 BACKEND=gl override what it chooses.
-set -euo pipefail
-program=$(realpath "$1")
-top=$(cd "$(dirname "$0")/.." && pwd)
+. "$(dirname "$0")/voxlink_measuring.sh"
 out=${2:-$top/docs/results/voxlink}
-scenes=$top/examples/scenes
-scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
 mkdir -p "$out"
-
-value() { # KEY of the last statistics
-  sed -n "s/^ *\"$1\": \"\{0,1\}\([^\",]*[^\",]\).*/\1/p" "$scratch/stats.json" | head -n 1
-}
-frames() { # seconds of every frame, one a line
-  sed -n '/"frameSeconds"/,/\]/s/^ *\([0-9][0-9.e-]*\),\{0,1\}$/\1/p' "$scratch/stats.json"
-}
-trace() { # arguments of freevoxel trace
-  "$program" trace "$@" --quiet --stats "$scratch/stats.json" -o "$scratch/picture.png"
-}
-
+views=${VIEWS:-$((few ? 2 : 360))}
+resolutions=${RESOLUTIONS:-256 512$( ((few)) || echo " 1024")}
+size=${SIZE:-$( ((few)) && echo 250x250 || echo 1000x1000)}
 printf 'x,y,z,radius\n0,0,0,1\n' >"$scratch/sphere.csv"
-trace "$scratch/sphere.csv" --size 32x32
-backend=${BACKEND:-$(value backend)}
-if [[ $backend == gl ]]; then
-  views=${VIEWS:-360} resolutions=${RESOLUTIONS:-256 512 1024} size=${SIZE:-1000x1000}
-  machine="$(value glRenderer)"
-else
-  views=${VIEWS:-2} resolutions=${RESOLUTIONS:-256 512} size=${SIZE:-250x250}
-  machine="no GPU: plain C++ on $(value threads) threads"
-fi
-turned="$machine, $size, mean of $((2 * views)) views of full turns about y and x"
+turned="$machine, $size, mean of $((2 * views)) views of full turns about y and x, load average of $(nproc) cores at the
+start: $(load)"
 
 row() { # of the last trace: voxels, bricks, memory, bytes a voxel, frames and rays
   echo "$(value storedVoxels) $(value occupiedBricks) $(value bricks) $(value bufferBytes) \
@@ -93,7 +72,7 @@ row() { # of the last trace: voxels, bricks, memory, bytes a voxel, frames and r
 
 # Steps per pass matter on the GPU only.
 small=$size
-[[ $backend == gl ]] || small=120x120
+((few)) && small=120x120
 {
   echo "| steps per pass | passes | fps, glass_bunny 256 [8], $small |"
   echo "|---|---|---|"
@@ -107,7 +86,7 @@ small=$size
 
 # Figure 6: the three scenes.
 for name in dragon glass_house glass_bunny; do
-  "$program" trace "$scenes/$name.json" --resolution 512 --backend "$backend" --size 480x360 --quiet -o "$scratch/$name.png"
+  draw "$scenes/$name.json" --resolution 512 --size 480x360 -o "$scratch/$name.png"
 done
 "$program" sheet "$scratch"/{dragon,glass_house,glass_bunny}.png --columns 3 -o "$out/figure6.png"
 
