@@ -36,7 +36,7 @@ void writeHeader(uint32_t* header, int edge, uint32_t first, const uint16_t* mas
   }
 }
 
-std::optional<uint32_t> VoxLinkBuffers::find(glm::ivec3 voxel) const {
+std::optional<size_t> BrickLists::stored(glm::ivec3 voxel) const {
   for (int axis = 0; axis < 3; ++axis) {
     if (voxel[axis] < grid.low[axis] || voxel[axis] >= grid.high[axis]) return std::nullopt;
   }
@@ -45,7 +45,7 @@ std::optional<uint32_t> VoxLinkBuffers::find(glm::ivec3 voxel) const {
   const glm::ivec3 local = voxel % grid.edge;
   const int column = local.y * grid.edge + local.x;
   if ((listMask(brick, grid.edge, column) >> local.z & 1u) == 0) return std::nullopt;
-  return fragments[storedVoxel(brick, grid.edge, column * grid.edge + local.z)];
+  return storedVoxel(brick, grid.edge, column * grid.edge + local.z);
 }
 
 std::vector<uint8_t> storedCodes(const TransferFunction& transfer, const ValueCoding& coding, double threshold) {

@@ -82,6 +82,8 @@ struct BrickLists {
     const uint32_t rank = word.rank + uint32_t(std::popcount(word.occupied & ((1u << bit) - 1u)));
     return brickHeaders.data() + size_t(rank) * size_t(shared::headerWords(grid.edge));
   }
+  /// Number of the stored voxel at a place; nothing if none is.
+  std::optional<size_t> stored(glm::ivec3 voxel) const;
 };
 
 /// A volume's voxels whose opacity is above a threshold.
@@ -95,7 +97,10 @@ struct VoxLinkBuffers : BrickLists {
     return listBytes() + fragments.size() * sizeof(uint32_t) + codes * sizeof(VoxelMaterial);
   }
   /// Fragment of a voxel of the volume; nothing if it is not stored.
-  std::optional<uint32_t> find(glm::ivec3 voxel) const;
+  std::optional<uint32_t> find(glm::ivec3 voxel) const {
+    const std::optional<size_t> at = stored(voxel);
+    return at ? std::optional<uint32_t>(fragments[*at]) : std::nullopt;
+  }
 };
 
 /// Per code: whether voxels of it are stored, which is whether their opacity (per reference length) is above the

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <glm/glm.hpp>
 #include <limits>
+#include <optional>
 
 #include "base/error.h"
 #include "voxlink/traversal.h"
@@ -23,9 +24,9 @@ struct SceneRay {
   float through = 1.0f;               ///< view ray: 1 - opacity so far
   vec3 brings{0.0f};                  ///< shadow ray: light for the pixel
   double end = INFINITY;              ///< shadow ray: the lamp
-  uint32_t ignored = 0, inside = 0;
+  uint32_t ignored = 0, left = 0, inside = 0;
   double ignoreUntil = 0.0;
-  bool thrownBack = false;
+  bool thrownBack = false, towardsLamp = false;
   int depth = 0;
 };
 
@@ -33,7 +34,7 @@ struct SceneRay {
 struct Meeting {
   double t = INFINITY, leave = 0.0;
   int fragment = -1;
-  uint32_t material = 0;
+  uint32_t material = 0, plane = 0;  ///< plane: 0 of a sphere
   bool leaving = false;
   vec3 outward{0.0f};  ///< of the surface itself: tells its sides
   vec3 normal{0.0f};   ///< for light, to the outside
@@ -104,14 +105,16 @@ class SceneTracer {
       const int number = int(i - first);
       const uint32_t kind = shared::fragmentKind(fragment.head);
       if (kind == shared::kVolume) continue;
-      const auto consider = [&](float t, float leave, uint32_t material, vec3 outward, vec3 normal) {
+      const auto consider = [&](float t, float leave, uint32_t material, uint32_t plane, vec3 outward, vec3 normal) {
         if (t < now || (t == now && number <= last)) return;
         const bool leaving = glm::dot(direction, outward) > 0.0f;
-        if (shared::sameSurface(ray.ignored, shared::surfaceKey(material, leaving)) && from + t < ray.ignoreUntil) {
+        const uint32_t key = shared::surfaceKey(material, leaving);
+        if (from + t < ray.ignoreUntil &&
+            (shared::sameSurface(ray.ignored, key) || shared::samePlane(ray.ignored, ray.left, key, plane, ray.towardsLamp))) {
           ray.ignoreUntil = std::max(ray.ignoreUntil, from + leave + shared::kGapVoxels);
           return;
         }
-        if (from + t < best.t) best = {from + t, from + leave, number, material, leaving, outward, normal};
+        if (from + t < best.t) best = {from + t, from + leave, number, material, plane, leaving, outward, normal};
       };
       if (kind == shared::kTriangles) {
         float t = 0.0f, leave = 0.0f;
@@ -119,10 +122,8 @@ class SceneTracer {
                                float(from - ray.start), ray.thrownBack, t, leave)) {
           continue;
         }
-        const vec3 outward = shared::planeNormal(fragment.body);
-        vec3 normal = shared::unpackDirection(fragment.head);
-        if ((glm::dot(normal, direction) > 0.0f) != (glm::dot(outward, direction) > 0.0f)) normal = outward;
-        consider(t, leave, shared::fragmentIndex(fragment.head), outward, normal);
+        consider(t, leave, shared::fragmentIndex(fragment.head), fragment.body, shared::planeNormal(fragment.body),
+                 shared::unpackDirection(fragment.head));
       } else {
         const SceneSphere& sphere = scene_.spheres[shared::sphereIndex(fragment.head)];
         const vec3 place(entry - dvec3(sphere.x, sphere.y, sphere.z));
@@ -132,16 +133,38 @@ class SceneTracer {
           if (root < -kSphereSlack || root > length + kSphereSlack) continue;
           const float inside = std::clamp(root, 0.0f, length);
           const vec3 outward = (place + root * direction) / sphere.radius;
-          consider(inside, inside, sphere.material, outward, outward);
+          consider(inside, inside, sphere.material, 0, outward, outward);
         }
       }
     }
     return best;
   }
 
+  /// The normal for light where a ray meets a plane: those of the surface around, blended.
+  vec3 blendedNormal(const Meeting& met, glm::ivec3 voxel, dvec3 place, vec3 direction) const {
+    const vec3 in(place - dvec3(voxel));
+    vec3 sum(0.0f);
+    for (int i = 0; i < 27; ++i) {
+      const glm::ivec3 step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+      const std::optional<size_t> stored = buffers_.stored(voxel + step);
+      if (!stored) continue;
+      const float weight = shared::blendWeight(in.x, step.x) * shared::blendWeight(in.y, step.y) *
+                           shared::blendWeight(in.z, step.z);
+      for (uint32_t k = buffers_.voxels[*stored]; k < buffers_.voxels[*stored + 1]; ++k) {
+        const SceneFragment& fragment = buffers_.fragments[k];
+        if (shared::fragmentKind(fragment.head) != shared::kTriangles) continue;
+        if (shared::fragmentIndex(fragment.head) != met.material) continue;
+        const vec3 normal = shared::unpackDirection(fragment.head);
+        sum += weight * shared::blendLikeness(glm::dot(normal, met.normal)) * normal;
+      }
+    }
+    return shared::facingNormal(sum, met.outward, direction);
+  }
+
   /// A ray goes on straight behind a surface.
   static void pass(SceneRay& ray, const Meeting& met) {
     ray.ignored = shared::surfaceKey(met.material, met.leaving);
+    ray.left = met.plane;
     ray.ignoreUntil = met.leave + shared::kGapVoxels;
   }
   /// A ray starts anew at a surface.
@@ -152,6 +175,7 @@ class SceneTracer {
     next.direction = glm::normalize(dvec3(direction));
     next.start = 0.0;
     next.ignored = shared::surfaceKey(met.material, glm::dot(direction, met.outward) > 0.0f);
+    next.left = met.plane;
     next.ignoreUntil = shared::kLeaveVoxels;
     return next;
   }
@@ -201,7 +225,7 @@ class SceneTracer {
                  double at = from;
                  int last = -1;
                  for (;;) {
-                   const Meeting met = nextMeeting(stored, voxel, ray, from, to, at, last);
+                   Meeting met = nextMeeting(stored, voxel, ray, from, to, at, last);
                    const bool found = met.fragment >= 0;
                    passVolumes(stored, float((found ? met.t : to) - at), ray, sums);
                    if (ray.through < shared::kLeastThrough) {
@@ -211,6 +235,9 @@ class SceneTracer {
                    if (!found) return true;
                    at = met.t;
                    last = met.fragment;
+                   if (met.plane != 0) {
+                     met.normal = blendedNormal(met, voxel, ray.origin + met.t * ray.direction, vec3(ray.direction));
+                   }
                    meet(ray, met, waiting, sums, rays, turned, ended);
                    if (turned || ended) return false;
                  }
@@ -286,6 +313,7 @@ class SceneTracer {
       }
       SceneRay shadowRay = from(ray, met, vec3(towards), true);
       shadowRay.end = distance;
+      shadowRay.towardsLamp = true;
       ++rays;
       add(sums, brings * shadow(shadowRay, glm::ivec3(-1)));
     }

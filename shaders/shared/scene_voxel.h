@@ -195,7 +195,7 @@ struct RayRecord {
   uint inside;                               // material of the glass it is in + 1; 0: none
   uint pixel;                                // y * width + x
   uint state;                                // depth, kShadowRay, kThrownBack
-  uint unused;
+  uint left;                                 // plane of the surface it leaves; 0: none, or a sphere
 };
 SHARED_CONSTANT uint kShadowRay = 1u << 31;
 // The ray started at a surface that it did not go through.
@@ -228,6 +228,17 @@ SHARED_FUNCTION uint surfaceKey(uint material, bool leaving) {
 // that it would leave too (materials meet within a voxel).
 SHARED_FUNCTION bool sameSurface(uint ignored, uint key) {
   return ignored == key || (ignored & key & 2u) != 0u;
+}
+// The same of planes of one material, whichever side is met: they are one surface if they face alike. Rays that graze a
+// surface meet its other voxels' planes, a little off, from either side. And meshes have triangles that are turned over:
+// outside of things, and on their way to a lamp, rays take planes that face the other way for the same surface, too;
+// inside they may not, or they would miss the other side of a pane of glass.
+SHARED_CONSTANT float kFacesAlike = 0.5f;
+SHARED_FUNCTION bool samePlane(uint ignored, uint left, uint key, uint plane, bool towardsLamp) {
+  if (left == 0u || plane == 0u || ignored >> 2 != key >> 2) return false;
+  float alike = dot(planeNormal(left), planeNormal(plane));
+  bool eitherWay = towardsLamp || (ignored & 2u) != 0u;
+  return (eitherWay && alike < 0.0f ? -alike : alike) > kFacesAlike;
 }
 // A ray that leaves a surface does not meet it again within so many voxels, on the same side: the surface goes on in
 // neighbouring voxels, a little off.
@@ -265,6 +276,30 @@ SHARED_FUNCTION bool meetPlane(uint plane, vec3 at, vec3 direction, float length
   if (thrownBack && (cross_ + begun) * steep < kThinWall) return false;
   t = min(max(cross_, enter), leave);
   return true;
+}
+
+// The normal for light where a ray meets a plane is blended from those of the 27 voxels round it: a quadratic B-spline
+// of where in its voxel the place is (`inVoxel`, 0 to 1; `step_` to the other voxel, -1 to 1),
+SHARED_FUNCTION float blendWeight(float inVoxel, int step_) {
+  float x = inVoxel < 0.0f ? 0.0f : inVoxel > 1.0f ? 1.0f : inVoxel;
+  if (step_ < 0) return 0.5f * (1.0f - x) * (1.0f - x);
+  return step_ > 0 ? 0.5f * x * x : 0.5f + x * (1.0f - x);
+}
+// times how alike the normals are: all up to 53 degrees, none from 78 on, so that edges stay sharp. Negative for those
+// that face the other way.
+SHARED_FUNCTION float blendLikeness(float cosine) {
+  float x = ((cosine < 0.0f ? -cosine : cosine) - 0.2f) * 2.5f;
+  x = x < 0.0f ? 0.0f : x > 1.0f ? 1.0f : x;
+  return cosine < 0.0f ? -x : x;
+}
+// A normal for light on the same side as the surface's own as seen along a ray: one that is turned away, or nearly, is
+// bent until it is not.
+SHARED_CONSTANT float kLeastFacing = 0.02f;
+SHARED_FUNCTION vec3 facingNormal(vec3 normal, vec3 outward, vec3 direction) {
+  float side = dot(outward, direction) < 0.0f ? -1.0f : 1.0f;
+  float along = side * dot(normal, direction);
+  if (along < kLeastFacing) normal = normal + ((kLeastFacing - along) * side) * direction;
+  return normal * (1.0f / sqrt(dot(normal, normal)));
 }
 
 // The two places where a ray meets a sphere; `at` from the sphere's centre. False if it misses.

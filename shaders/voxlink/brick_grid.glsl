@@ -33,3 +33,16 @@ bool findBrick(ivec3 brick, out uint header) {
   header = rank * uint(headerWords(edge));
   return (word.occupied >> bit & 1u) != 0u;
 }
+
+// Number of the stored voxel at a place; false if none is.
+bool findVoxel(ivec3 voxel, out uint stored) {
+  ivec3 at = clamp(voxel, boxLow, boxHigh - 1);
+  uint header;
+  bool occupied = findBrick(at / edge, header);
+  ivec3 local = at % edge;
+  int column = local.y * edge + local.x;
+  stored = 0u;
+  if (!occupied || at != voxel || (columnMask(header, column) >> local.z & 1u) == 0u) return false;
+  stored = storedVoxel(header, column * edge + local.z);
+  return true;
+}

@@ -44,7 +44,7 @@ const int kMostWork = 12000;
 struct Meeting {
   float t, leave;  // leave: where the ray is out of reach of its plane
   int fragment;    // -1: none
-  uint material;
+  uint material, plane;  // plane: 0 of a sphere
   bool leaving;
   vec3 outward, normal;
 };
@@ -56,19 +56,21 @@ vec3 originOf(RayRecord ray) {
   return vec3(ray.originX, ray.originY, ray.originZ);
 }
 
-void consider(float t, float leave, int number, uint material, vec3 outward, vec3 normal, WalkStep s, vec3 direction,
-              float now, inout RayRecord ray, inout Meeting best) {
+void consider(float t, float leave, int number, uint material, uint plane, vec3 outward, vec3 normal, WalkStep s,
+              vec3 direction, float now, inout RayRecord ray, inout Meeting best) {
   bool leaving = dot(direction, outward) > 0.0;
   bool ahead = t > now || (t == now && number > ray.last);
-  bool same = sameSurface(ray.ignored, surfaceKey(material, leaving)) && s.from + t < ray.ignoreUntil;
+  uint key = surfaceKey(material, leaving);
+  bool same = s.from + t < ray.ignoreUntil &&
+              (sameSurface(ray.ignored, key) || samePlane(ray.ignored, ray.left, key, plane, (ray.state & kShadowRay) != 0u));
   if (ahead && same) ray.ignoreUntil = max(ray.ignoreUntil, s.from + leave + kGapVoxels);
   if (ahead && !same && s.from + t < best.t)
-    best = Meeting(s.from + t, s.from + leave, number, material, leaving, outward, normal);
+    best = Meeting(s.from + t, s.from + leave, number, material, plane, leaving, outward, normal);
 }
 
 // The surface that a ray meets next in a voxel, after ray.last at ray.at.
 Meeting nextMeeting(WalkStep s, float to, inout RayRecord ray) {
-  Meeting best = Meeting(kFar, 0.0, -1, 0u, false, vec3(0.0), vec3(0.0));
+  Meeting best = Meeting(kFar, 0.0, -1, 0u, 0u, false, vec3(0.0), vec3(0.0));
   float length_ = to - s.from, now = ray.at - s.from;
   vec3 direction = directionOf(ray);
   vec3 entry = originOf(ray) + s.from * direction;
@@ -81,10 +83,10 @@ Meeting nextMeeting(WalkStep s, float to, inout RayRecord ray) {
       float t = 0.0, leave = 0.0;
       bool met = meetPlane(fragment.body, entry - (vec3(s.voxel) + 0.5), direction, length_, s.from - ray.start,
                            (ray.state & kThrownBack) != 0u, t, leave);
-      vec3 outward = planeNormal(fragment.body);
-      vec3 normal = unpackDirection(fragment.head);
-      if ((dot(normal, direction) > 0.0) != (dot(outward, direction) > 0.0)) normal = outward;
-      if (met) consider(t, leave, number, fragmentIndex(fragment.head), outward, normal, s, direction, now, ray, best);
+      if (met) {
+        consider(t, leave, number, fragmentIndex(fragment.head), fragment.body, planeNormal(fragment.body),
+                 unpackDirection(fragment.head), s, direction, now, ray, best);
+      }
     } else if (kind == kSphere) {
       SceneSphere sphere = sphereBuffer[sphereIndex(fragment.head)];
       vec3 from = entry - vec3(sphere.x, sphere.y, sphere.z);
@@ -95,11 +97,32 @@ Meeting nextMeeting(WalkStep s, float to, inout RayRecord ray) {
         float t = clamp(root, 0.0, length_);
         vec3 outward = (from + root * direction) / sphere.radius;
         if (met && root >= -kSphereSlack && root <= length_ + kSphereSlack)
-          consider(t, t, number, sphere.material, outward, outward, s, direction, now, ray, best);
+          consider(t, t, number, sphere.material, 0u, outward, outward, s, direction, now, ray, best);
       }
     }
   }
   return best;
+}
+
+// The normal for light where a ray meets a plane: those of the surface around, blended.
+vec3 blendedNormal(Meeting met, ivec3 voxel, vec3 place_, vec3 direction) {
+  vec3 within = place_ - vec3(voxel);
+  vec3 sum = vec3(0.0);
+  for (int i = 0; i < 27; ++i) {
+    ivec3 step_ = ivec3(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    uint stored;
+    if (findVoxel(voxel + step_, stored)) {
+      float weight = blendWeight(within.x, step_.x) * blendWeight(within.y, step_.y) * blendWeight(within.z, step_.z);
+      uint first = voxelBuffer[stored], end = voxelBuffer[stored + 1u];
+      for (uint k = first; k < end; ++k) {
+        uint head = fragmentBuffer[k].head;
+        vec3 normal = unpackDirection(head);
+        if (fragmentKind(head) == kTriangles && fragmentIndex(head) == met.material)
+          sum += weight * blendLikeness(dot(normal, met.normal)) * normal;
+      }
+    }
+  }
+  return facingNormal(sum, met.outward, direction);
 }
 
 // What the volumes in a voxel take over a length, and send.
@@ -143,6 +166,7 @@ void pushNew(RayRecord ray) {
 // A ray goes on straight behind a surface.
 void pass(inout RayRecord ray, Meeting met) {
   ray.ignored = surfaceKey(met.material, met.leaving);
+  ray.left = met.plane;
   ray.ignoreUntil = met.leave + kGapVoxels;
 }
 
@@ -164,6 +188,7 @@ RayRecord startFrom(RayRecord ray, Meeting met, WalkStep s, vec3 direction, bool
   ray.at = 0.0;
   ray.last = -1;
   ray.ignored = surfaceKey(met.material, dot(direction, met.outward) > 0.0);
+  ray.left = met.plane;
   ray.ignoreUntil = kLeaveVoxels;
   ray.state = thrownBack ? ray.state | kThrownBack : ray.state & ~kThrownBack;
   return ray;
@@ -361,6 +386,11 @@ void main() {
         pass(ray, met);
         ended = ray.through < kLeastThrough;
         continue;
+      }
+      if (met.plane != 0u) {
+        vec3 hit = originOf(ray) + met.t * directionOf(ray);
+        met.normal = blendedNormal(met, s.voxel, hit, directionOf(ray));
+        work += 27 + 27 * fragments;
       }
       int outcome = meet(ray, met, s);
       if (outcome == kEnded) ended = true;
