@@ -106,10 +106,11 @@ class SceneReader {
     const uint32_t firstMaterial =
         addMaterials(std::move(mesh.materials), object.material, mesh.materialOfTriangle, all.materials);
     // Where only some objects have normals the others' are 0: unknown.
-    if (!mesh.normals.empty() && all.normals.empty()) all.normals.assign(firstVertex, glm::vec3(0.0f));
+    const bool haveNormals = !mesh.normals.empty() || !all.normals.empty();
+    if (haveNormals) all.normals.resize(firstVertex, glm::vec3(0.0f));
     for (const glm::vec3 position : mesh.positions)
       all.positions.push_back(placed(position, object.place, rotation));
-    if (!all.normals.empty()) {
+    if (haveNormals) {
       for (const glm::vec3 normal : mesh.normals)
         all.normals.push_back(glm::vec3(rotation * glm::dvec3(normal)));
       all.normals.resize(all.positions.size(), glm::vec3(0.0f));

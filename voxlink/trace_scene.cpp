@@ -122,8 +122,9 @@ class SceneTracer {
                                float(from - ray.start), ray.thrownBack, t, leave)) {
           continue;
         }
-        consider(t, leave, shared::fragmentIndex(fragment.head), fragment.body, shared::planeNormal(fragment.body),
-                 shared::unpackDirection(fragment.head));
+        const vec3 normal = shared::unpackDirection(fragment.head);
+        consider(t, leave, shared::fragmentIndex(fragment.head), fragment.body,
+                 shared::planeOutward(fragment.body, normal), normal);
       } else {
         const SceneSphere& sphere = scene_.spheres[shared::sphereIndex(fragment.head)];
         const vec3 place(entry - dvec3(sphere.x, sphere.y, sphere.z));

@@ -159,6 +159,12 @@ SHARED_FUNCTION vec3 planeNormal(uint plane) {
   vec3 normal = axis == 0u ? vec3(1.0f, u, v) : axis == 1u ? vec3(v, 1.0f, u) : vec3(u, v, 1.0f);
   return normal * scale;
 }
+// The side of a plane that is outside. Scanned meshes have triangles that are turned over: the normal for light, a mean of
+// the neighbours' where the mesh is smooth, knows better.
+SHARED_FUNCTION vec3 planeOutward(uint plane, vec3 normal) {
+  vec3 own = planeNormal(plane);
+  return dot(own, normal) < 0.0f ? -own : own;
+}
 
 // ---- normals: polar, 16 bits, 8 of the angle from z and 8 of the angle about it ----
 // (shaders/shared/direction_code.h packs them.)

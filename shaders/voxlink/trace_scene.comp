@@ -84,8 +84,9 @@ Meeting nextMeeting(WalkStep s, float to, inout RayRecord ray) {
       bool met = meetPlane(fragment.body, entry - (vec3(s.voxel) + 0.5), direction, length_, s.from - ray.start,
                            (ray.state & kThrownBack) != 0u, t, leave);
       if (met) {
-        consider(t, leave, number, fragmentIndex(fragment.head), fragment.body, planeNormal(fragment.body),
-                 unpackDirection(fragment.head), s, direction, now, ray, best);
+        vec3 normal = unpackDirection(fragment.head);
+        consider(t, leave, number, fragmentIndex(fragment.head), fragment.body, planeOutward(fragment.body, normal),
+                 normal, s, direction, now, ray, best);
       }
     } else if (kind == kSphere) {
       SceneSphere sphere = sphereBuffer[sphereIndex(fragment.head)];
