@@ -109,8 +109,8 @@ class SceneTracer {
         if (t < now || (t == now && number <= last)) return;
         const bool leaving = glm::dot(direction, outward) > 0.0f;
         const uint32_t key = shared::surfaceKey(material, leaving);
-        if (from + t < ray.ignoreUntil &&
-            (shared::sameSurface(ray.ignored, key) || shared::samePlane(ray.ignored, ray.left, key, plane, ray.towardsLamp))) {
+        if (from + t < ray.ignoreUntil && (shared::sameSurface(ray.ignored, key) ||
+                                           shared::samePlane(ray.ignored, ray.left, key, plane, ray.towardsLamp))) {
           ray.ignoreUntil = std::max(ray.ignoreUntil, from + leave + shared::kGapVoxels);
           return;
         }
@@ -149,8 +149,8 @@ class SceneTracer {
       const glm::ivec3 step(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
       const std::optional<size_t> stored = buffers_.stored(voxel + step);
       if (!stored) continue;
-      const float weight = shared::blendWeight(in.x, step.x) * shared::blendWeight(in.y, step.y) *
-                           shared::blendWeight(in.z, step.z);
+      const float weight =
+          shared::blendWeight(in.x, step.x) * shared::blendWeight(in.y, step.y) * shared::blendWeight(in.z, step.z);
       for (uint32_t k = buffers_.voxels[*stored]; k < buffers_.voxels[*stored + 1]; ++k) {
         const SceneFragment& fragment = buffers_.fragments[k];
         if (shared::fragmentKind(fragment.head) != shared::kTriangles) continue;

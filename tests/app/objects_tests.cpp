@@ -14,11 +14,18 @@ const char* const kSquare =
     "3\nproperty list uchar int vertex_indices\nend_header\n-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\nnan 0 0\n4 0 1 2 3\n3 0 1 "
     "4\n3 0 1 1\n";
 
+/// A roof whose ridge is the y axis, 0.6 above its edges.
+const char* const kRoof =
+    "ply\nformat ascii 1.0\nelement vertex 6\nproperty float x\nproperty float y\nproperty float z\nelement face "
+    "2\nproperty list uchar int vertex_indices\nend_header\n-1 -1 0\n0 -1 0.6\n1 -1 0\n-1 1 0\n0 1 0.6\n1 1 0\n"
+    "4 0 1 4 3\n4 1 2 5 4\n";
+
 class Objects : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
     folder = temporaryFolder();
     writeBytes(folder + "/square.ply", kSquare);
+    writeBytes(folder + "/roof.ply", kRoof);
     writeBytes(folder + "/atoms.xyz", "2\n\nO 0 0 0\nC 0 0 9\n");
   }
   /// Looks along -z at 10 x 10 lengths about the origin.
@@ -81,6 +88,20 @@ TEST_F(Objects, turnAboutXThenYThenZ) {
   const Image both = turned("[60, 60, 0]");
   EXPECT_NEAR(both.at(42, 13)[3], 1.0f, 0.01f);
   EXPECT_EQ(both.at(32, 3)[3], 0.0f);
+}
+
+// Flat, the right half is as bright everywhere; smooth, the ridge looks up, past the lamp at the right. The first mesh
+// of a scene, too.
+TEST_F(Objects, haveSmoothNormalsWhereTheSceneSaysSo) {
+  const auto roof = [](const char* more) {
+    return trace("\"meshes\": [{\"file\": \"roof.ply\", \"scale\": 4" + std::string(more) +
+                 "}], \"ambient\": 0, \"shading\": \"lambert\",\n\"lights\": [{\"direction\": [1, 0, 0]}]");
+  };
+  const Image flat = roof(""), smooth = roof(", \"smooth\": true");
+  EXPECT_NEAR(flat.at(28, 20)[0], 0.51f, 0.02f);
+  EXPECT_NEAR(flat.at(38, 20)[0], 0.51f, 0.02f);
+  EXPECT_LT(smooth.at(28, 20)[0], 0.25f);
+  EXPECT_GT(smooth.at(38, 20)[0], 0.4f);
 }
 
 TEST_F(Objects, ofAFileAlone) {

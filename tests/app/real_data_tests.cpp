@@ -88,5 +88,41 @@ TEST_P(RealData, becomesAPictureInAnyOrder) {
 INSTANTIATE_TEST_SUITE_P(DataSets, RealData, ::testing::ValuesIn(kDataSets),
                          [](const auto& testInfo) { return testInfo.param.name; });
 
+// The scenes of examples/scenes, traced on the GPU (or what stands in for it) and by plain C++. As in
+// SceneTracers.AgreeOnEverythingTogether, pixels whose rays graze an edge may differ, and glass carries that on.
+class ExampleScenes : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(ExampleScenes, lookAlikeOnBothBackends) {
+  if (!dataFolder()) GTEST_SKIP() << kNoData;
+  const std::string folder = temporaryFolder();
+  for (const char* backend : {"gl", "cpu"}) {
+    freevoxelDone(folder, words("trace " + sourceFolder() + "/examples/scenes/" + GetParam() +
+                                ".json --resolution 128 --size 161x120 -o " + backend + ".exr --backend " + backend));
+  }
+  const Image found = readImage(folder + "/gl.exr"), expected = readImage(folder + "/cpu.exr");
+  size_t covered = 0, flipped = 0;
+  double sum = 0.0;
+  for (size_t i = 0; i < found.pixels.size(); i += 4) {
+    covered += expected.pixels[i + 3] > 0.0f || found.pixels[i + 3] > 0.0f ? 1 : 0;
+    float most = 0.0f, mean = 0.0f;
+    for (size_t channel = 0; channel < 4; ++channel) {
+      const float difference = found.pixels[i + channel] - expected.pixels[i + channel];
+      most = std::max(most, std::abs(difference));
+      mean += difference / 4.0f;
+    }
+    if (most <= 0.01f) continue;
+    ++flipped;
+    sum += double(mean);
+  }
+  std::printf("%s: %zu of %zu pixels flipped, mean %g\n", GetParam(), flipped, covered, sum / double(covered));
+  EXPECT_GT(covered, 1000u);
+  EXPECT_LE(double(flipped), 0.03 * double(covered));
+  EXPECT_LE(std::abs(sum) / double(covered), 1e-3);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ExampleScenes,
+                         ::testing::Values("glass_house", "glass_bunny", "dragon", "halo", "capsid", "tea",
+                                           "two_heads"));
+
 }  // namespace
 }  // namespace freevoxel::test

@@ -274,6 +274,57 @@ TEST(Shadows, FallWhereTheyShould) {
   }
 }
 
+// Scanned meshes have triangles that are turned over. Where the mesh is smooth they do not show: neither as dark specks
+// in their own shadow nor as surfaces that are seen from behind.
+TEST(Shadows, TrianglesThatAreTurnedOverDoNotShow) {
+  TracedScene scene;
+  const uint32_t red = addMaterial(scene.mesh, {0.8f, 0.3f, 0.2f});
+  addEllipsoid(scene.mesh, {0.1f, 0.0f, 0.2f}, {1.0f, 1.3f, 0.8f}, 40, red, true);
+  TracedScene turned = scene;
+  for (size_t i = 0; i < turned.mesh.triangles.size(); i += 13)
+    std::swap(turned.mesh.triangles[i].x, turned.mesh.triangles[i].y);
+  const Camera camera = viewFromAbove(scene, {90, 80});
+  const auto picture = [&](const TracedScene& traced) {
+    SceneVoxLink voxlink(traced, {.resolution = 150}, nullptr, silentProgress());
+    voxlink.light(twoLamps(), Shadows::rays);
+    return voxlink.trace(camera, silentProgress());
+  };
+  const Image expected = picture(scene), found = picture(turned);
+  size_t covered = 0, specks = 0;
+  for (size_t i = 0; i < found.pixels.size(); i += 4) {
+    covered += expected.pixels[i + 3] > 0.5f ? 1 : 0;
+    specks += std::abs(found.pixels[i] - expected.pixels[i]) > 0.05f ? 1 : 0;
+  }
+  EXPECT_GT(covered, 1000u);
+  EXPECT_LE(specks, covered / 500);
+}
+
+// The normal for light goes on smoothly from voxel to voxel: across an ellipsoid neighbouring pixels differ no more
+// than its curvature makes them.
+TEST(Normals, AreBlendedBetweenVoxels) {
+  TracedScene scene;
+  const uint32_t white = addMaterial(scene.mesh, vec3(1.0f));
+  addEllipsoid(scene.mesh, vec3(0.0f), {1.0f, 1.0f, 1.0f}, 60, white, true);
+  Camera camera;
+  camera.eye = {0.0, 0.0, 9.0};
+  camera.orthographicHeight = 1.0;
+  camera.imageSize = {160, 150};
+  SceneVoxLink voxlink(scene, {.resolution = 40}, nullptr, silentProgress());
+  Lighting lighting;
+  lighting.ambient = 0.0f;
+  lighting.shading = Shading::lambert;
+  lighting.lights = {{true, {1.0, 0.0, 1.0}, vec3(1.0f)}};
+  voxlink.light(lighting, Shadows::none);
+  const Image picture = voxlink.trace(camera, silentProgress());
+  float worst = 0.0f;
+  for (int y = 0; y < camera.imageSize.y; ++y) {
+    for (int x = 0; x + 1 < camera.imageSize.x; ++x)
+      worst = std::max(worst, std::abs(picture.at(x + 1, y)[0] - picture.at(x, y)[0]));
+  }
+  // A pixel is 1/150 across: 0.007 of curvature. One normal a voxel, 1/20 wide, would jump by 0.035 and more.
+  EXPECT_LE(worst, 0.016f);
+}
+
 // ---- the two tracers ----
 
 // Floats put a ray that grazes an edge into another voxel, and glass carries that on: such pixels are few, and brighter
