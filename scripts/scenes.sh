@@ -33,8 +33,6 @@ print("Written by `scripts/scenes.sh`, plain C++ (`--backend cpu`), %d threads; 
       % json.load(open(os.path.join(statistics, "dragon.json")))["threads"])
 print("Bytes per voxel count every buffer that tracing reads, spheres and materials among them. Seconds: reading files,")
 print("building the buffers, shadows of volumes, tracing one picture.\n")
-print("Known flaws: a mesh has one normal per voxel and facing, so the glass bunny refracts in blotches; single pixels of the")
-print("dragon are dark that should not be.\n")
 print("| scene | what | voxels along the longest edge | stored voxels | bytes per voxel | rays | read | build | shadows | trace |")
 print("|---|---|---|---|---|---|---|---|---|---|")
 for scene, what in about.items():
