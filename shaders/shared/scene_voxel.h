@@ -159,8 +159,8 @@ SHARED_FUNCTION vec3 planeNormal(uint plane) {
   vec3 normal = axis == 0u ? vec3(1.0f, u, v) : axis == 1u ? vec3(v, 1.0f, u) : vec3(u, v, 1.0f);
   return normal * scale;
 }
-// The side of a plane that is outside. Scanned meshes have triangles that are turned over: the normal for light, a mean of
-// the neighbours' where the mesh is smooth, knows better.
+// The side of a plane that is outside. Scanned meshes have triangles that are turned over: the normal for light, a mean
+// of the neighbours' where the mesh is smooth, knows better.
 SHARED_FUNCTION vec3 planeOutward(uint plane, vec3 normal) {
   vec3 own = planeNormal(plane);
   return dot(own, normal) < 0.0f ? -own : own;
@@ -236,9 +236,9 @@ SHARED_FUNCTION bool sameSurface(uint ignored, uint key) {
   return ignored == key || (ignored & key & 2u) != 0u;
 }
 // The same of planes of one material, whichever side is met: they are one surface if they face alike. Rays that graze a
-// surface meet its other voxels' planes, a little off, from either side. And meshes have triangles that are turned over:
-// outside of things, and on their way to a lamp, rays take planes that face the other way for the same surface, too;
-// inside they may not, or they would miss the other side of a pane of glass.
+// surface meet its other voxels' planes, a little off, from either side. And meshes have triangles that are turned
+// over: outside of things, and on their way to a lamp, rays take planes that face the other way for the same surface,
+// too; inside they may not, or they would miss the other side of a pane of glass.
 SHARED_CONSTANT float kFacesAlike = 0.5f;
 SHARED_FUNCTION bool samePlane(uint ignored, uint left, uint key, uint plane, bool towardsLamp) {
   if (left == 0u || plane == 0u || ignored >> 2 != key >> 2) return false;
