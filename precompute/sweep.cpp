@@ -14,6 +14,7 @@
 #include "base/grid.h"
 #include "precompute/stored_bricks.h"
 #include "precompute/sweep_kernels.h"
+#include "precompute/sweep_memory.h"
 #include "shaders/shared/directions.h"
 
 namespace freevoxel {
@@ -24,16 +25,14 @@ namespace {
 class Rows {
  public:
   Rows() = default;
-  Rows(int count, int width) : stride_(size_t(width) + 2 * kRowUnit), lines_(size_t(count) * stride_ / kRowUnit) {}
-  FixedDepth* row(int i) { return reinterpret_cast<FixedDepth*>(lines_.data()) + size_t(i) * stride_ + kRowUnit; }
+  Rows(int count, int width, SweepMemory& memory)
+      : stride_(size_t(width) + 2 * kRowUnit), first_(memory.zeros(size_t(count) * stride_)) {}
+  FixedDepth* row(int i) { return first_ + size_t(i) * stride_ + kRowUnit; }
   size_t stride() const { return stride_; }
 
  private:
-  struct alignas(64) Line {
-    FixedDepth depths[kRowUnit];
-  };
   size_t stride_ = 0;
-  std::vector<Line> lines_;
+  FixedDepth* first_ = nullptr;
 };
 
 /// Sizes that everything here shares. A strip is four rows of voxels, all of x, in every plane of a slab.
@@ -88,13 +87,13 @@ SlabBricks sortBricks(const Shape& shape, std::span<const BrickPlanes> bricks) {
 /// Rows of one strip that the next one needs too stay where they are.
 class StripTerms {
  public:
-  StripTerms(const Shape& shape, SegmentRule rule) {
+  StripTerms(const Shape& shape, SegmentRule rule, SweepMemory& memory) {
     const int rows = (shape.edge + 1) * kPlaneRows;
-    own_ = Rows(rows, shape.width);
+    own_ = Rows(rows, shape.width, memory);
     if (rule == SegmentRule::neighbour) return;
-    code_ = Rows(rows, shape.width);
-    high_ = Rows(rows, shape.width);
-    if (rule == SegmentRule::splitIntegral) low_ = Rows(rows, shape.width);
+    code_ = Rows(rows, shape.width, memory);
+    high_ = Rows(rows, shape.width, memory);
+    if (rule == SegmentRule::splitIntegral) low_ = Rows(rows, shape.width, memory);
   }
 
   /// The strips of a slab come one after another.
@@ -112,6 +111,7 @@ class StripTerms {
       const int yBefore = (strip_ - filledBefore_) * kRunEdge + y;
       const bool filled = filledBefore_ != kNoStrip && yBefore >= -1 && yBefore <= kRunEdge;
       if (filled || first.y < 0 || first.y >= shape.dims.y) continue;
+      prefetchRow(shape, codes, first + glm::ivec3(0, kRunEdge * (strip_ < filledBefore_ ? -1 : 1), 0));
       const int row = place * kPlaneRows + rowInPlane(y);
       segments.terms({codes.codes + linearIndex(first, shape.dims), size_t(shape.dims.x)},
                      {own_.row(row), floats(code_, row), floats(high_, row), floats(low_, row)});
@@ -136,17 +136,29 @@ class StripTerms {
     return rows.stride() == 0 ? nullptr : reinterpret_cast<float*>(rows.row(row));
   }
 
+  /// What the next strip will read: rows of successive planes lie too far apart for the processor to foresee.
+  static void prefetchRow(const Shape& shape, const CodeSlab& codes, glm::ivec3 first) {
+    if (first.y < 0 || first.y >= shape.dims.y) return;
+    const uint16_t* const row = codes.codes + linearIndex(first, shape.dims);
+    for (int x = 0; x < shape.dims.x; x += kCodesPerLine)
+      __builtin_prefetch(row + x);
+  }
+
+  static constexpr int kCodesPerLine = 32;
   Rows own_, code_, high_, low_;
   int strip_ = kNoStrip, filledBefore_ = kNoStrip;
 };
 
 /// What a thread needs for the strip at hand.
 struct Scratch {
-  Scratch(const Shape& shape, SegmentRule rule)
-      : terms(shape, rule), noDepths(1, shape.width), segments(1, shape.width), bytes(kRunEdge, shape.width) {}
+  Scratch(const Shape& shape, SegmentRule rule, SweepMemory& memory)
+      : terms(shape, rule, memory),
+        noDepths(1, shape.width, memory),
+        depths(kRunEdge, shape.width, memory),
+        bytes(kRunEdge, shape.width, memory) {}
   StripTerms terms;
   Rows noDepths;  ///< zeros
-  Rows segments;
+  Rows depths;    ///< of one plane of a strip, for level 1
   Rows bytes;  ///< four planes of a strip: see TilePlane::bytes
 };
 
@@ -162,13 +174,13 @@ struct TilePlace {
 /// Depths along one direction, kept from plane to plane and from strip to strip.
 class DirectionSweep {
  public:
-  DirectionSweep(int direction, const Shape& shape, SegmentRule rule)
+  DirectionSweep(int direction, const Shape& shape, SegmentRule rule, SweepMemory& memory)
       : direction_(direction),
         step_(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction)),
-        state_(step_.z != 0 ? shape.strips() * kRunEdge : kRunEdge, shape.width) {
+        state_(step_.z != 0 ? shape.strips() * kRunEdge : 0, shape.width, memory) {
     if (step_.y != 0) {
       for (Rows& rows : edges_)
-        rows = Rows(shape.edge + 1, shape.width);
+        rows = Rows(shape.edge + 1, shape.width, memory);
     }
     tile_.rule = rule;
     tile_.stride = state_.stride();
@@ -199,14 +211,16 @@ class DirectionSweep {
     tile_.terms = scratch.terms.all();
     tile_.state = state_.row(step_.z != 0 ? strip * kRunEdge : 0);
     tile_.wanted = bricks.wanted[size_t(strip / shape.runsPerEdge())].data();
-    tile_.segments = scratch.segments.row(0);
+    tile_.depths = nullptr;
     tile_.beyondRow = -1;
     for (int y = 0; y < kRunEdge; ++y) {
       const auto row = size_t(y);
       const int volumeY = strip * kRunEdge + y, nextY = volumeY + step_.y;
-      if (volumeY >= shape.dims.y || nextY < 0 || nextY >= shape.dims.y) {
+      tile_.own[row] = volumeY < shape.dims.y ? scratch.terms.row(y) : scratch.terms.nothing();
+      tile_.linked[row] = volumeY < shape.dims.y && nextY >= 0 && nextY < shape.dims.y;
+      if (!tile_.linked[row]) {
         tile_.next[row] = scratch.noDepths.row(0);
-        tile_.own[row] = tile_.neighbour[row] = scratch.terms.nothing();
+        tile_.from[row] = tile_.neighbour[row] = scratch.terms.nothing();
         continue;
       }
       if (y + step_.y < 0 || y + step_.y >= kRunEdge) {
@@ -214,7 +228,7 @@ class DirectionSweep {
       } else {
         tile_.next[row] = tile_.state + size_t(y + step_.y) * tile_.stride;
       }
-      tile_.own[row] = scratch.terms.row(y);
+      tile_.from[row] = tile_.own[row];
       tile_.neighbour[row] = scratch.terms.row(y + step_.y);
     }
     if (step_.y != 0 && step_.z != 0) {
@@ -250,7 +264,7 @@ class DirectionSweep {
         plane.leaving = edges_[1].row(done + 1);
       }
       if (levels.depths != nullptr) {
-        sweepPlanes(shape, codes, place, levels);
+        sweepPlanes(shape, codes, place, levels, scratch.depths.row(0));
       } else {
         tile_.planeCount = place.planes;
         sweepTile(tile_);
@@ -265,17 +279,19 @@ class DirectionSweep {
 
  private:
   /// One plane of the tile after the other, since level 1 needs the depths of each.
-  void sweepPlanes(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const LevelTarget& levels) {
+  void sweepPlanes(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const LevelTarget& levels,
+                   FixedDepth* depths) {
     const std::array<TilePlane, kRunEdge> planes = tile_.planes;
     const bool up = sweepPass(direction_) == 0;
     const int firstRow = place.strip * kRunEdge, slab = place.firstZ / shape.edge;
     const auto columns = size_t(shape.dims.x + 1) / 2, rows = size_t(shape.dims.y + 1) / 2;
     tile_.planeCount = 1;
+    tile_.depths = depths;
     for (int i = 0; i < place.planes; ++i) {
       tile_.planes[0] = planes[size_t(i)];
       sweepTile(tile_);
       const int z = place.firstZ + (up ? i : -i), local = z - slab * shape.edge;
-      LevelTap::Plane plane{tile_.state, tile_.stride, nullptr, std::min(kRunEdge, shape.dims.y - firstRow),
+      LevelTap::Plane plane{depths, tile_.stride, nullptr, std::min(kRunEdge, shape.dims.y - firstRow),
                             shape.dims.x};
       if (levels.weights != nullptr)
         plane.codes = codes.codes + linearIndex({0, firstRow, z - codes.first}, shape.dims);
@@ -315,10 +331,10 @@ struct SweepGroup {
 
   void sweepSlab(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int slab,
                  const SlabBricks& bricks, const LevelTarget& levels, const std::vector<FixedDepth>& incoming,
-                 Scratch& scratch) {
+                 Scratch& scratch, SweepMemory& memory) {
     if (sweeps.empty()) {
       for (const int direction : directions) {
-        sweeps.emplace_back(direction, shape, segments.rule());
+        sweeps.emplace_back(direction, shape, segments.rule(), memory);
         if (sweeps.back().step().z != 0 && !incoming.empty()) {
           sweeps.back().setDepths(shape, incoming.data() + borderOffset(shape, direction));
         }
@@ -376,16 +392,26 @@ std::vector<SweepGroup> makeGroups(unsigned passes, bool bordersOnly, int thread
   return groups;
 }
 
-/// Gives the groups as they are after the last slab.
+/// Numbers that sweeps keep: see sweepBytes.
+uint64_t sweepMemory(const Shape& shape, int passCount, int threads) {
+  const uint64_t row = uint64_t(shape.width) + 2 * kRowUnit;
+  const auto e = uint64_t(shape.edge);
+  const uint64_t directionRows = 9 * uint64_t(shape.strips()) * kRunEdge + 9 * 2 * (e + 1);
+  const uint64_t threadRows = 4 * (e + 1) * (kRunEdge + 3) + 2 * kRunEdge + 1;
+  return row * (uint64_t(passCount) * directionRows + uint64_t(threads) * threadRows);
+}
+
+/// Gives the groups as they are after the last slab; their depths lie in `memory`.
 std::vector<SweepGroup> sweepSlabs(CodePlanes& codes, const Shape& shape, const SegmentDepth& segments,
-                                   AttenuationSink& sink, unsigned passes, const SweepPart& part) {
+                                   AttenuationSink& sink, unsigned passes, const SweepPart& part,
+                                   SweepMemory& memory) {
   check(validDims(shape.dims) && validBrickEdge(shape.edge), "dims and brick edge are valid");
   check(0 <= part.firstSlab && part.firstSlab <= part.lastSlab && part.lastSlab <= shape.slabs(), "slabs are there");
   const int threads = omp_get_max_threads();
   std::vector<SweepGroup> groups = makeGroups(passes, part.bordersOnly, threads);
   std::vector<Scratch> scratches;
   for (int i = 0; i < threads; ++i)
-    scratches.emplace_back(shape, segments.rule());
+    scratches.emplace_back(shape, segments.rule(), memory);
 
   // Both passes run at once, one from each end.
   for (int step = 0; step < part.lastSlab - part.firstSlab; ++step) {
@@ -410,7 +436,8 @@ std::vector<SweepGroup> sweepSlabs(CodePlanes& codes, const Shape& shape, const 
       failure.guard([&] {
         SweepGroup& group = groups[i];
         group.sweepSlab(shape, segments, slabCodes[group.pass], slabs[group.pass], bricks[group.pass],
-                        levels[group.pass], part.incoming[size_t(group.pass)], scratches[size_t(omp_get_thread_num())]);
+                        levels[group.pass], part.incoming[size_t(group.pass)], scratches[size_t(omp_get_thread_num())],
+                        memory);
       });
     }
     failure.rethrow();
@@ -437,13 +464,16 @@ std::span<const uint16_t> StoredCodePlanes::planes(int /*pass*/, int first, int 
 
 void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments, AttenuationSink& sink,
                       unsigned passes) {
-  sweepSlabs(codes, Shape(dims, edge), segments, sink, passes, {0, Shape(dims, edge).slabs(), {}, false});
+  const Shape shape(dims, edge);
+  SweepMemory memory(sweepMemory(shape, std::popcount(passes), omp_get_max_threads()));
+  sweepSlabs(codes, shape, segments, sink, passes, {0, shape.slabs(), {}, false}, memory);
 }
 
 BorderDepths sweepPart(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments,
                        AttenuationSink& sink, unsigned passes, const SweepPart& part) {
   const Shape shape(dims, edge);
-  std::vector<SweepGroup> groups = sweepSlabs(codes, shape, segments, sink, passes, part);
+  SweepMemory memory(sweepMemory(shape, std::popcount(passes), omp_get_max_threads()));
+  std::vector<SweepGroup> groups = sweepSlabs(codes, shape, segments, sink, passes, part, memory);
   BorderDepths outgoing;
   for (SweepGroup& group : groups) {
     auto& depths = outgoing[size_t(group.pass)];
@@ -468,12 +498,7 @@ void addIncoming(std::span<const FixedDepth> incoming, int direction, int planes
 }
 
 uint64_t sweepBytes(glm::ivec3 dims, int edge, int passCount, int threads) {
-  const Shape shape(dims, edge);
-  const uint64_t rowBytes = (uint64_t(shape.width) + 2 * kRowUnit) * sizeof(FixedDepth);
-  const auto e = uint64_t(edge);
-  const uint64_t directionRows = 9 * uint64_t(shape.strips()) * kRunEdge + 4 * kRunEdge + 9 * 2 * (e + 1);
-  const uint64_t threadRows = 4 * (e + 1) * (kRunEdge + 3) + kRunEdge + 2;
-  return rowBytes * (uint64_t(passCount) * directionRows + uint64_t(threads) * threadRows);
+  return sweepMemory(Shape(dims, edge), passCount, threads) * sizeof(FixedDepth);
 }
 
 }  // namespace freevoxel

@@ -48,18 +48,13 @@ HWY_INLINE Depths meanOrOwn(Floats integral, Floats codes, Depths own) {
 /// Segments from voxels of entry `own` on to those of entry `neighbour` on, where both lie in the volume.
 template <SegmentRule rule>
 HWY_INLINE Depths segmentsBetween(const SegmentTerms& terms, ptrdiff_t own, ptrdiff_t neighbour) {
-  const Tag tag;
   const hn::RebindToFloat<Tag> floats;
-  if constexpr (rule == SegmentRule::neighbour) {
-    return hn::LoadU(tag, terms.own + neighbour);
-  } else {
-    const auto difference = [&](const float* values) HWY_ATTR {
-      return hn::Sub(hn::LoadU(floats, values + neighbour), hn::LoadU(floats, values + own));
-    };
-    auto integral = difference(terms.high);
-    if constexpr (rule == SegmentRule::splitIntegral) integral = hn::Add(integral, difference(terms.low));
-    return meanOrOwn(integral, difference(terms.code), hn::LoadU(tag, terms.own + own));
-  }
+  const auto difference = [&](const float* values) HWY_ATTR {
+    return hn::Sub(hn::LoadU(floats, values + neighbour), hn::LoadU(floats, values + own));
+  };
+  auto integral = difference(terms.high);
+  if constexpr (rule == SegmentRule::splitIntegral) integral = hn::Add(integral, difference(terms.low));
+  return meanOrOwn(integral, difference(terms.code), hn::LoadU(Tag(), terms.own + own));
 }
 
 /// Which voxels of a row lie in the volume with their neighbours.
@@ -152,8 +147,97 @@ HWY_INLINE void codeRows(const Depths (&rows)[kRunEdge], ptrdiff_t x, uint8_t* b
 
 #endif
 
-/// Calls f(x) for all vectors of a row. Where a row is renewed in place from the neighbour after, it goes upwards, from
-/// the one before downwards.
+/// What four rows hold at x, one register each.
+using FourRows = Depths[kRunEdge];
+
+/// Lane i is lane i + 1 of `here`, the last one lane 0 of `beside`; or the other way round if `step` is -1.
+template <int step>
+HWY_INLINE Depths shifted(Depths here, Depths beside) {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+  return Depths{step > 0 ? _mm512_alignr_epi32(beside.raw, here.raw, 1) : _mm512_alignr_epi32(here.raw, beside.raw, 15)};
+#else
+  const Tag tag;
+  const size_t lanes = hn::Lanes(tag);
+  HWY_ALIGN uint32_t both[2 * kRowUnit];
+  hn::Store(step > 0 ? here : beside, tag, both);
+  hn::Store(step > 0 ? beside : here, tag, both + lanes);
+  return hn::LoadU(tag, both + (step > 0 ? 1 : lanes - 1));
+#endif
+}
+
+/// Sums of a lane and all those before it (kUp) or behind it.
+template <bool kUp>
+HWY_INLINE Depths runningSum(Depths v) {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+  const __m512i zero = _mm512_setzero_si512();
+  const auto add = [&](__m512i moved) { v = Depths{_mm512_add_epi32(v.raw, moved)}; };
+  add(kUp ? _mm512_alignr_epi32(v.raw, zero, 15) : _mm512_alignr_epi32(zero, v.raw, 1));
+  add(kUp ? _mm512_alignr_epi32(v.raw, zero, 14) : _mm512_alignr_epi32(zero, v.raw, 2));
+  add(kUp ? _mm512_alignr_epi32(v.raw, zero, 12) : _mm512_alignr_epi32(zero, v.raw, 4));
+  add(kUp ? _mm512_alignr_epi32(v.raw, zero, 8) : _mm512_alignr_epi32(zero, v.raw, 8));
+  return v;
+#else
+  const Tag tag;
+  const size_t lanes = hn::Lanes(tag);
+  HWY_ALIGN uint32_t padded[3 * kRowUnit] = {};
+  for (size_t shift = 1; shift < lanes; shift *= 2) {
+    hn::Store(v, tag, padded + lanes);
+    v = hn::Add(v, hn::LoadU(tag, padded + (kUp ? lanes - shift : lanes + shift)));
+  }
+  return v;
+#endif
+}
+
+/// The last lane (kUp) or the first one, in all lanes.
+template <bool kUp>
+HWY_INLINE Depths lastOf(Depths v) {
+#if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
+  return Depths{_mm512_permutexvar_epi32(_mm512_set1_epi32(kUp ? 15 : 0), v.raw)};
+#else
+  const Tag tag;
+  HWY_ALIGN uint32_t lanes[kRowUnit];
+  hn::Store(v, tag, lanes);
+  return hn::Set(tag, lanes[kUp ? hn::Lanes(tag) - 1 : 0]);
+#endif
+}
+
+/// What neighbours further in see of a voxel: with the rule `neighbour` its depth and its own, else its depth.
+template <SegmentRule rule>
+HWY_INLINE Depths passedOn(Depths depths, const SegmentTerms& terms, ptrdiff_t own) {
+  if constexpr (rule != SegmentRule::neighbour) return depths;
+  return hn::Add(depths, hn::LoadU(Tag(), terms.own + own));
+}
+
+/// A plane of a tile at hand: where its rows are.
+struct PlaneRows {
+  HWY_INLINE PlaneRows(const Tile& tile, const TilePlane& plane) : inside(tile) {
+    for (size_t row = 0; row < kRunEdge; ++row) {
+      own[row] = ptrdiff_t(plane.own) + tile.own[row];
+      from[row] = ptrdiff_t(plane.own) + tile.from[row];
+      neighbour[row] = ptrdiff_t(plane.neighbour) + tile.neighbour[row] + tile.stepX;
+    }
+  }
+  Inside inside;
+  /// Entries of the voxels, and of both ends of segments.
+  ptrdiff_t own[kRunEdge], from[kRunEdge], neighbour[kRunEdge];
+};
+
+/// Depths of four rows at x are found.
+HWY_INLINE void give(const Tile& tile, const TilePlane& plane, const FourRows& rows, ptrdiff_t x) {
+  if (tile.depths != nullptr) {
+    for (size_t row = 0; row < kRunEdge; ++row)
+      hn::StoreU(rows[row], Tag(), tile.depths + row * tile.stride + x);
+  }
+  if (tile.wanted[x / kRowUnit] != 0) codeRows(rows, x, plane.bytes);
+}
+
+HWY_INLINE void keepInside(const Inside& inside, ptrdiff_t x, FourRows& rows) {
+  if (inside.all(x)) return;
+  for (Depths& row : rows)
+    row = inside.only(row, x);
+}
+
+/// Calls f(x) for all vectors of a row.
 template <class F>
 HWY_INLINE void forRow(int width, bool descending, F&& f) {
   const auto lanes = ptrdiff_t(hn::Lanes(Tag()));
@@ -166,144 +250,138 @@ HWY_INLINE void forRow(int width, bool descending, F&& f) {
   }
 }
 
-/// One plane from the plane before.
+/// One plane from the plane before, in place: from the neighbour after upwards in x, from the one before downwards.
 template <SegmentRule rule, bool cut>
 HWY_INLINE void renewPlane(const Tile& tile, const TilePlane& plane) {
   const Tag tag;
-  const Inside inside(tile);
+  const PlaneRows at(tile, plane);
   const SegmentTerms terms = tile.terms;
   FixedDepth* const state = tile.state;
+  FixedDepth* const leaving = plane.leaving;
   const size_t stride = tile.stride;
-  const uint8_t* const wanted = tile.wanted;
+  const FixedDepth* const leavingRow = state + size_t(tile.leavingRow) * stride;
   const FixedDepth* next[kRunEdge];
-  ptrdiff_t own[kRunEdge], neighbour[kRunEdge];
-  for (size_t row = 0; row < kRunEdge; ++row) {
+  for (size_t row = 0; row < kRunEdge; ++row)
     next[row] = (int(row) == tile.beyondRow ? plane.beyond : tile.next[row]) + tile.stepX;
-    own[row] = ptrdiff_t(plane.own) + tile.own[row];
-    neighbour[row] = ptrdiff_t(plane.neighbour) + tile.neighbour[row] + tile.stepX;
-  }
   forRow(tile.width, tile.stepX < 0, [&](ptrdiff_t x) HWY_ATTR {
     // All rows are read before one is written.
-    Depths rows[kRunEdge];
+    FourRows rows;
     for (size_t row = 0; row < kRunEdge; ++row) {
-      const Depths segments = segmentsBetween<rule>(terms, own[row] + x, neighbour[row] + x);
-      rows[row] = hn::Add(hn::LoadU(tag, next[row] + x), segments);
+      rows[row] = hn::LoadU(tag, next[row] + x);
+      if constexpr (rule != SegmentRule::neighbour)
+        rows[row] = hn::Add(rows[row], segmentsBetween<rule>(terms, at.from[row] + x, at.neighbour[row] + x));
     }
-    if (!inside.all(x)) {
-      for (Depths& row : rows)
-        row = inside.only(row, x);
-    }
+    keepInside(at.inside, x, rows);
     for (size_t row = 0; row < kRunEdge; ++row) {
-      if (cut) rows[row] = kept(rows[row]);
-      hn::StoreU(rows[row], tag, state + row * stride + x);
+      const Depths passed = passedOn<rule>(rows[row], terms, at.own[row] + x);
+      hn::StoreU(cut ? kept(passed) : passed, tag, state + row * stride + x);
     }
-    if (wanted[x / kRowUnit] != 0) codeRows(rows, x, plane.bytes);
+    if (leaving != nullptr) hn::StoreU(hn::LoadU(tag, leavingRow + x), tag, leaving + x);
+    give(tile, plane, rows, x);
   });
 }
 
-/// Running sum along a row, upwards in x or downwards.
-template <bool kUp>
-HWY_INLINE void addAlongRow(const FixedDepth* segments, int width, FixedDepth* depths) {
+/// One plane in itself, row by row, against stepY; within a row against stepX.
+template <SegmentRule rule, int stepX>
+HWY_INLINE void renewAcrossRows(const Tile& tile, const TilePlane& plane) {
   const Tag tag;
-  const auto lanes = ptrdiff_t(hn::Lanes(tag));
-  // Lane i takes lane i -+ shift, for shifts 1, 2, 4 and 8, as far as there are lanes; 0 beyond.
-  constexpr int kShifts = 4;
-  HWY_ALIGN uint32_t from[kShifts + 1][kRowUnit] = {};
-  HWY_ALIGN uint32_t inside[kShifts][kRowUnit] = {};
-  for (ptrdiff_t i = 0; i < lanes; ++i) {
-    for (int s = 0; s < kShifts; ++s) {
-      const ptrdiff_t source = kUp ? i - (1 << s) : i + (1 << s);
-      const bool valid = source >= 0 && source < lanes;
-      from[s][i] = valid ? uint32_t(source) : 0;
-      inside[s][i] = valid ? ~0u : 0;
+  const PlaneRows at(tile, plane);
+  const size_t first = tile.stepY < 0 ? 0 : kRunEdge - 1;
+  const FixedDepth* const beyond = tile.beyondRow < 0 ? nullptr : plane.beyond;
+  Depths beside[kRunEdge];
+  for (Depths& row : beside)
+    row = hn::Zero(tag);
+  forRow(tile.width, stepX > 0, [&](ptrdiff_t x) HWY_ATTR {
+    FourRows rows;
+    Depths passed = beyond != nullptr ? hn::LoadU(tag, beyond + x) : hn::Zero(tag);
+    for (size_t i = 0; i < kRunEdge; ++i) {
+      const size_t row = first == 0 ? i : first - i;
+      Depths depths = passed;
+      if constexpr (stepX != 0) depths = shifted<stepX>(passed, beside[i]);
+      beside[i] = passed;
+      if constexpr (rule != SegmentRule::neighbour)
+        depths = hn::Add(depths, segmentsBetween<rule>(tile.terms, at.from[row] + x, at.neighbour[row] + x));
+      if (!tile.linked[row]) depths = hn::Zero(tag);
+      if (!at.inside.all(x)) depths = at.inside.only(depths, x);
+      rows[row] = depths;
+      passed = passedOn<rule>(depths, tile.terms, at.own[row] + x);
     }
-    from[kShifts][i] = kUp ? uint32_t(lanes - 1) : 0;
-  }
-  const auto shifted = [&](Depths v, int s) HWY_ATTR {
-    return hn::And(hn::TableLookupLanes(v, hn::SetTableIndices(tag, from[s])), hn::Load(tag, inside[s]));
-  };
-  const auto last = hn::SetTableIndices(tag, from[kShifts]);
-  Depths carry = hn::Zero(tag);
-  for (ptrdiff_t i = 0; i < width; i += lanes) {
-    const ptrdiff_t x = kUp ? i : width - lanes - i;
-    Depths v = hn::LoadU(tag, segments + x);
-    for (int s = 0; s < kShifts && (1 << s) < lanes; ++s)
-      v = hn::Add(v, shifted(v, s));
-    v = kept(hn::Add(v, carry));
-    hn::StoreU(v, tag, depths + x);
-    carry = hn::TableLookupLanes(v, last);
-  }
-}
-
-/// One row from its neighbour of the same plane, or along itself.
-template <SegmentRule rule>
-HWY_INLINE void renewRow(const Tile& tile, const TilePlane& plane, size_t row) {
-  const Tag tag;
-  const Inside inside(tile);
-  FixedDepth* const depths = tile.state + row * tile.stride;
-  const auto segmentsAt = [&](ptrdiff_t x) HWY_ATTR {
-    return segmentsBetween<rule>(tile.terms, ptrdiff_t(plane.own) + tile.own[row] + x,
-                                 ptrdiff_t(plane.neighbour) + tile.neighbour[row] + tile.stepX + x);
-  };
-  if (tile.stepY != 0) {
-    const FixedDepth* const next = (int(row) == tile.beyondRow ? plane.beyond : tile.next[row]) + tile.stepX;
-    forRow(tile.width, false, [&](ptrdiff_t x) HWY_ATTR {
-      const Depths sum = kept(hn::Add(segmentsAt(x), hn::LoadU(tag, next + x)));
-      hn::StoreU(inside.all(x) ? sum : inside.only(sum, x), tag, depths + x);
-    });
-    return;
-  }
-  forRow(tile.width, false, [&](ptrdiff_t x) HWY_ATTR {
-    const Depths segments = segmentsAt(x);
-    hn::StoreU(inside.all(x) ? segments : inside.only(segments, x), tag, tile.segments + x);
-  });
-  if (tile.stepX < 0) {
-    addAlongRow<true>(tile.segments, tile.width, depths);
-  } else {
-    addAlongRow<false>(tile.segments, tile.width, depths);
-  }
-  // A running sum carries on behind the volume.
-  std::fill(depths + tile.voxels, depths + tile.width, 0);
-}
-
-/// One plane in itself.
-template <SegmentRule rule>
-HWY_INLINE void renewWithinPlane(const Tile& tile, const TilePlane& plane) {
-  for (size_t i = 0; i < kRunEdge; ++i)
-    renewRow<rule>(tile, plane, tile.stepY > 0 ? kRunEdge - 1 - i : i);
-  const Tag tag;
-  forRow(tile.width, false, [&](ptrdiff_t x) HWY_ATTR {
-    if (tile.wanted[x / kRowUnit] == 0) return;
-    Depths rows[kRunEdge];
-    for (size_t row = 0; row < kRunEdge; ++row)
-      rows[row] = hn::LoadU(tag, tile.state + row * tile.stride + x);
-    codeRows(rows, x, plane.bytes);
+    hn::StoreU(kept(passed), tag, plane.leaving + x);
+    give(tile, plane, rows, x);
   });
 }
 
-/// A plane from which one step leaves the volume.
+/// One plane in itself, along rows, against stepX.
+template <SegmentRule rule, int stepX>
+HWY_INLINE void renewAlongRows(const Tile& tile, const TilePlane& plane) {
+  constexpr bool kUp = stepX < 0;
+  const Tag tag;
+  const PlaneRows at(tile, plane);
+  Depths before[kRunEdge];  // sums of the vector before; with the rule `neighbour` those of all its lanes matter
+  for (Depths& row : before)
+    row = hn::Zero(tag);
+  forRow(tile.width, !kUp, [&](ptrdiff_t x) HWY_ATTR {
+    FourRows rows;
+    for (size_t row = 0; row < kRunEdge; ++row) {
+      Depths v;
+      if constexpr (rule == SegmentRule::neighbour) {
+        v = hn::LoadU(tag, tile.terms.own + at.own[row] + x);
+      } else {
+        v = segmentsBetween<rule>(tile.terms, at.from[row] + x, at.neighbour[row] + x);
+        if (!at.inside.all(x)) v = at.inside.only(v, x);
+      }
+      const Depths sums = kept(hn::Add(runningSum<kUp>(v), lastOf<kUp>(before[row])));
+      rows[row] = rule == SegmentRule::neighbour ? shifted<stepX>(sums, before[row]) : sums;
+      before[row] = sums;
+    }
+    // A running sum carries on behind the volume.
+    keepInside(at.inside, x, rows);
+    give(tile, plane, rows, x);
+  });
+}
+
+/// Nothing further out: depths are 0.
+template <SegmentRule rule>
 void clearPlane(const Tile& tile, const TilePlane& plane) {
-  for (size_t row = 0; row < kRunEdge; ++row)
-    std::fill_n(tile.state + row * tile.stride, tile.width, FixedDepth(0));
-  std::memset(plane.bytes, attenuationCode(0), size_t(kRunEdge) * size_t(tile.width));
+  const Tag tag;
+  const PlaneRows at(tile, plane);
+  forRow(tile.width, false, [&](ptrdiff_t x) HWY_ATTR {
+    FourRows rows;
+    for (size_t row = 0; row < kRunEdge; ++row) {
+      rows[row] = hn::Zero(tag);
+      hn::StoreU(passedOn<rule>(rows[row], tile.terms, at.own[row] + x), tag, tile.state + row * tile.stride + x);
+    }
+    give(tile, plane, rows, x);
+  });
+  if (plane.leaving != nullptr) {
+    std::memcpy(plane.leaving, tile.state + size_t(tile.leavingRow) * tile.stride,
+                size_t(tile.width) * sizeof(FixedDepth));
+  }
 }
 
 template <SegmentRule rule>
-void sweepTileBy(const Tile& tile) {
+void renewWithinPlane(const Tile& tile, const TilePlane& plane) {
+  if (tile.stepY == 0) {
+    tile.stepX < 0 ? renewAlongRows<rule, -1>(tile, plane) : renewAlongRows<rule, 1>(tile, plane);
+  } else if (tile.stepX == 0) {
+    renewAcrossRows<rule, 0>(tile, plane);
+  } else {
+    tile.stepX < 0 ? renewAcrossRows<rule, -1>(tile, plane) : renewAcrossRows<rule, 1>(tile, plane);
+  }
+}
+
+template <SegmentRule rule>
+void sweepTileBy(Tile tile) {  // a copy: what is written to rows cannot change it
   for (int i = 0; i < tile.planeCount; ++i) {
     const TilePlane& plane = tile.planes[size_t(i)];
     if (plane.neighbourOutside) {
-      clearPlane(tile, plane);
+      clearPlane<rule>(tile, plane);
     } else if (tile.samePlane) {
       renewWithinPlane<rule>(tile, plane);
     } else if (i + 1 < tile.planeCount) {
       renewPlane<rule, false>(tile, plane);
     } else {
       renewPlane<rule, true>(tile, plane);
-    }
-    if (plane.leaving != nullptr) {
-      std::memcpy(plane.leaving, tile.state + size_t(tile.leavingRow) * tile.stride,
-                  size_t(tile.width) * sizeof(FixedDepth));
     }
   }
 }

@@ -14,8 +14,8 @@
 
 namespace freevoxel {
 
-/// From plane to plane depths are cut to this at the end of a tile, within a plane in every row. Everything from 9 log2
-/// on has A8 = 0, so bytes are those of saturation at 2^32 - 1; and this and 16 segments do not leave 32 bits.
+/// What is passed on is cut to this at the end of a tile, along a row in every vector. Everything from 9 log2 on has
+/// A8 = 0, so bytes are those of saturation at 2^32 - 1; and this and 16 segments do not leave 32 bits.
 inline constexpr FixedDepth kLargestKeptDepth = 0x0fffffff;
 
 /// Rows are this long or a multiple of it, and have as much room before and behind them.
@@ -25,37 +25,41 @@ inline constexpr int kRowUnit = 16;
 struct TilePlane {
   uint32_t own = 0, neighbour = 0;     ///< entries of Tile::terms at which the voxels' and the neighbours' planes start
   bool neighbourOutside = false;       ///< the neighbours' plane lies outside the volume
-  const FixedDepth* beyond = nullptr;  ///< depths of Tile::beyondRow's neighbours
-  FixedDepth* leaving = nullptr;       ///< where Tile::leavingRow is copied to, or null
+  const FixedDepth* beyond = nullptr;  ///< what Tile::beyondRow's neighbours pass on
+  FixedDepth* leaving = nullptr;       ///< where to put what Tile::leavingRow passes on, or null
   uint8_t* bytes = nullptr;            ///< A8: byte x % 4 + 4 * row of the 16 at 4 * (x - x % 4)
 };
 
-/// Depths of four rows, renewed from plane to plane along one direction. All rows have room of zeros before and behind
-/// them. Neighbours' rows are given less the step along x.
+/// Four rows of voxels along one direction. A voxel passes on what its neighbours further in see: its depth, with the
+/// rule `neighbour` and its own. State is what the plane before passes on. All rows have room of zeros before and behind
+/// them; neighbours' rows are given less the step along x.
 struct Tile {
   SegmentRule rule = SegmentRule::neighbour;
   SegmentTerms terms;
-  /// From the start of a plane to the rows of the voxels and of their neighbours: where a neighbour's row lies outside
-  /// the volume, both to a row of zeros.
-  std::array<uint32_t, kRunEdge> own{}, neighbour{};
-  /// Depths of the neighbours: for directions that leave the plane, of the plane before. Zeros outside the volume.
+  /// From the start of a plane to the rows of the voxels: outside the volume to a row of zeros.
+  std::array<uint32_t, kRunEdge> own{};
+  /// Whether the rows and their neighbours' lie in the volume.
+  std::array<bool, kRunEdge> linked{};
+  /// The rows at both ends of segments: if not linked, both a row of zeros.
+  std::array<uint32_t, kRunEdge> from{}, neighbour{};
+  /// What the neighbours pass on, of directions that leave the plane: rows of the state; zeros if not linked.
   std::array<const FixedDepth*, kRunEdge> next{};
-  int beyondRow = -1;           ///< the row that takes TilePlane::beyond in place of `next`, or none
-  int leavingRow = 0;           ///< the row that neighbours of other tiles will need
-  FixedDepth* state = nullptr;  ///< row 0
-  size_t stride = 0;            ///< from row to row
-  int width = 0;                ///< voxels of a row, rounded up to kRowUnit
-  int voxels = 0;               ///< of a row, inside the volume
+  int beyondRow = -1;            ///< the row that takes TilePlane::beyond in place of `next`, or none
+  int leavingRow = 0;            ///< the row that neighbours of other tiles will need
+  FixedDepth* state = nullptr;   ///< row 0; not used by directions that stay in their plane
+  FixedDepth* depths = nullptr;  ///< room for four rows of depths, if these are wanted
+  size_t stride = 0;             ///< from row to row of both
+  int width = 0;                 ///< voxels of a row, rounded up to kRowUnit
+  int voxels = 0;                ///< of a row, inside the volume
   int stepX = 0, stepY = 0;
   bool samePlane = false;           ///< the direction stays in its plane
   const uint8_t* wanted = nullptr;  ///< for each kRowUnit voxels: whether their bytes are needed
-  FixedDepth* segments = nullptr;   ///< room for a row, for directions that stay in their plane
   std::array<TilePlane, kRunEdge> planes{};
   int planeCount = 0;
 };
 
-/// Renews the state plane by plane and gives the bytes of every plane. Room before and behind the rows, and behind
-/// `voxels`, must be 0 and stays so.
+/// Renews the state plane by plane and gives the bytes of every plane, and the depths of the last one. Room before and
+/// behind the rows must be 0 and stays so.
 void sweepTile(const Tile& tile);
 
 /// Where the runs of a brick go.
