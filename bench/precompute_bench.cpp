@@ -11,10 +11,9 @@
 #include <cstring>
 #include <memory>
 #include <random>
-#include <utility>
 #include <vector>
 
-#include "precompute/hilbert.h"
+#include "bench/planes_in_memory.h"
 #include "precompute/stored_bricks.h"
 #include "precompute/sweep.h"
 #include "shaders/shared/directions.h"
@@ -23,7 +22,6 @@ namespace freevoxel {
 namespace {
 
 constexpr int kRuns = 5;
-constexpr int kBrickEdge = 16;
 constexpr size_t kPageBytesTouched = 4096;
 
 double secondsOf(const auto& f) {
@@ -69,35 +67,6 @@ void streamZeros(uint8_t* first, size_t bytes) {
   _mm_sfence();
 }
 
-/// All bricks of a volume in file order, each section's planes one after another.
-class PlanesInMemory final : public AttenuationSink {
- public:
-  PlanesInMemory(glm::ivec3 dims, uint8_t* memory) {
-    const glm::ivec3 bricks = brickDims(dims, kBrickEdge);
-    const int order = brickCurveOrder(dims, kBrickEdge);
-    std::vector<std::pair<uint64_t, glm::ivec3>> sorted;
-    for (int z = 0; z < bricks.z; ++z) {
-      for (int y = 0; y < bricks.y; ++y) {
-        for (int x = 0; x < bricks.x; ++x)
-          sorted.emplace_back(hilbertIndex({x, y, z}, order), glm::ivec3(x, y, z));
-      }
-    }
-    std::sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    for (auto& pass : slabs_) {
-      pass.resize(size_t(bricks.z));
-      for (const auto& [index, position] : sorted) {
-        pass[size_t(position.z)].push_back({position, hilbertState(position, order), memory});
-        memory += kDirectionsPerSection * kBrickEdge * kBrickEdge * kBrickEdge;
-      }
-    }
-  }
-  std::span<const BrickPlanes> begin(int pass, int slab) override { return slabs_[size_t(pass)][size_t(slab)]; }
-  void complete(int /*pass*/, int /*slab*/) override {}
-
- private:
-  std::vector<std::vector<BrickPlanes>> slabs_[kSweepPasses];
-};
-
 struct Field {
   const char* name;
   std::vector<uint16_t> (*codes)(int edge);
@@ -133,8 +102,8 @@ void measure(int edge, const Field& field, Classification classification, int th
   omp_set_num_threads(threads);
   const glm::ivec3 dims(edge);
   const std::vector<uint16_t> codes = field.codes(edge);
-  const glm::ivec3 bricks = brickDims(dims, kBrickEdge);
-  const Buffer buffer(voxelCount(bricks) * kBrickEdge * kBrickEdge * kBrickEdge * shared::kDirectionCount);
+  const glm::ivec3 bricks = brickDims(dims, kBenchBrickEdge);
+  const Buffer buffer(voxelCount(bricks) * kBenchBrickEdge * kBenchBrickEdge * kBenchBrickEdge * shared::kDirectionCount);
   const auto set = [](uint8_t* first, size_t bytes) { std::memset(first, 1, bytes); };
   const double firstTouch = buffer.gigabytesPerSecond(set);
 
@@ -147,7 +116,7 @@ void measure(int edge, const Field& field, Classification classification, int th
   for (int run = 0; run < kRuns; ++run) {
     std::unique_ptr<SegmentDepth> segments;
     tables.push_back(secondsOf([&] { segments = makeSegmentDepth(classification, transfer, coding); }));
-    sweeps.push_back(secondsOf([&] { sweepAttenuation(planes, dims, kBrickEdge, *segments, sink); }));
+    sweeps.push_back(secondsOf([&] { sweepAttenuation(planes, dims, kBenchBrickEdge, *segments, sink); }));
     memsets.push_back(buffer.gigabytesPerSecond(set));
     streams.push_back(buffer.gigabytesPerSecond(streamZeros));
   }

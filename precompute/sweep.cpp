@@ -159,7 +159,7 @@ struct Scratch {
   StripTerms terms;
   Rows noDepths;  ///< zeros
   Rows depths;    ///< of one plane of a strip, for level 1
-  Rows bytes;  ///< four planes of a strip: see TilePlane::bytes
+  Rows bytes;     ///< four planes of a strip: see TilePlane::bytes
 };
 
 /// Four planes of a strip, in the order of the sweep.
@@ -291,8 +291,7 @@ class DirectionSweep {
       tile_.planes[0] = planes[size_t(i)];
       sweepTile(tile_);
       const int z = place.firstZ + (up ? i : -i), local = z - slab * shape.edge;
-      LevelTap::Plane plane{depths, tile_.stride, nullptr, std::min(kRunEdge, shape.dims.y - firstRow),
-                            shape.dims.x};
+      LevelTap::Plane plane{depths, tile_.stride, nullptr, std::min(kRunEdge, shape.dims.y - firstRow), shape.dims.x};
       if (levels.weights != nullptr)
         plane.codes = codes.codes + linearIndex({0, firstRow, z - codes.first}, shape.dims);
       // Planes 2 n and 2 n + 1 come one after the other, in either order.
@@ -403,8 +402,7 @@ uint64_t sweepMemory(const Shape& shape, int passCount, int threads) {
 
 /// Gives the groups as they are after the last slab; their depths lie in `memory`.
 std::vector<SweepGroup> sweepSlabs(CodePlanes& codes, const Shape& shape, const SegmentDepth& segments,
-                                   AttenuationSink& sink, unsigned passes, const SweepPart& part,
-                                   SweepMemory& memory) {
+                                   AttenuationSink& sink, unsigned passes, const SweepPart& part, SweepMemory& memory) {
   check(validDims(shape.dims) && validBrickEdge(shape.edge), "dims and brick edge are valid");
   check(0 <= part.firstSlab && part.firstSlab <= part.lastSlab && part.lastSlab <= shape.slabs(), "slabs are there");
   const int threads = omp_get_max_threads();

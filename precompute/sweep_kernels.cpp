@@ -154,7 +154,8 @@ using FourRows = Depths[kRunEdge];
 template <int step>
 HWY_INLINE Depths shifted(Depths here, Depths beside) {
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_AVX3
-  return Depths{step > 0 ? _mm512_alignr_epi32(beside.raw, here.raw, 1) : _mm512_alignr_epi32(here.raw, beside.raw, 15)};
+  return Depths{step > 0 ? _mm512_alignr_epi32(beside.raw, here.raw, 1)
+                         : _mm512_alignr_epi32(here.raw, beside.raw, 15)};
 #else
   const Tag tag;
   const size_t lanes = hn::Lanes(tag);

@@ -31,8 +31,8 @@ struct TilePlane {
 };
 
 /// Four rows of voxels along one direction. A voxel passes on what its neighbours further in see: its depth, with the
-/// rule `neighbour` and its own. State is what the plane before passes on. All rows have room of zeros before and behind
-/// them; neighbours' rows are given less the step along x.
+/// rule `neighbour` and its own. State is what the plane before passes on. All rows have room of zeros before and
+/// behind them; neighbours' rows are given less the step along x.
 struct Tile {
   SegmentRule rule = SegmentRule::neighbour;
   SegmentTerms terms;
