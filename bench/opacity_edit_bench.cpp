@@ -1,5 +1,5 @@
-// From an opacity edit to the new picture, stage by stage, for a volume of bytes that is already open. Prints a Markdown
-// table; arguments: edges of the volume, 256 if there are none. Threads as OMP_NUM_THREADS says.
+// From an opacity edit to the new picture, stage by stage, for a volume of bytes that is already open. Prints a
+// Markdown table; arguments: edges of the volume, 256 if there are none. Threads as OMP_NUM_THREADS says.
 #include <fmt/format.h>
 #include <omp.h>
 
@@ -60,9 +60,9 @@ void measure(int edge) {
   std::vector<uint8_t> memory(voxelCount(brickDims(dims, kBenchBrickEdge)) * kBenchBrickEdge * kBenchBrickEdge *
                                   kBenchBrickEdge * shared::kDirectionCount +
                               kBrickPlaneAlignment);
-  auto* const first = memory.data() + (kBrickPlaneAlignment - reinterpret_cast<uintptr_t>(memory.data()) %
-                                                                  kBrickPlaneAlignment) %
-                                          kBrickPlaneAlignment;
+  auto* const first =
+      memory.data() +
+      (kBrickPlaneAlignment - reinterpret_cast<uintptr_t>(memory.data()) % kBrickPlaneAlignment) % kBrickPlaneAlignment;
   PlanesInMemory sink(dims, first);
   StoredCodePlanes planes(grid.codes, dims);
   for (const auto classification : {Classification::preintegrated, Classification::voxel}) {
@@ -70,10 +70,8 @@ void measure(int edge) {
     for (int run = 0; run < kRuns; ++run) {
       const TransferFunction edited = transferOf(0.1 + 0.02 * run);
       std::unique_ptr<SegmentDepth> segments;
-      const double tableSeconds =
-          secondsOf([&] { segments = makeSegmentDepth(classification, edited, grid.coding); });
-      const double sweepSeconds =
-          secondsOf([&] { sweepAttenuation(planes, dims, kBenchBrickEdge, *segments, sink); });
+      const double tableSeconds = secondsOf([&] { segments = makeSegmentDepth(classification, edited, grid.coding); });
+      const double sweepSeconds = secondsOf([&] { sweepAttenuation(planes, dims, kBenchBrickEdge, *segments, sink); });
       table.add(tableSeconds);
       sweep.add(sweepSeconds);
       attenuation.add(tableSeconds + sweepSeconds);

@@ -103,7 +103,8 @@ void measure(int edge, const Field& field, Classification classification, int th
   const glm::ivec3 dims(edge);
   const std::vector<uint16_t> codes = field.codes(edge);
   const glm::ivec3 bricks = brickDims(dims, kBenchBrickEdge);
-  const Buffer buffer(voxelCount(bricks) * kBenchBrickEdge * kBenchBrickEdge * kBenchBrickEdge * shared::kDirectionCount);
+  const Buffer buffer(voxelCount(bricks) * kBenchBrickEdge * kBenchBrickEdge * kBenchBrickEdge *
+                      shared::kDirectionCount);
   const auto set = [](uint8_t* first, size_t bytes) { std::memset(first, 1, bytes); };
   const double firstTouch = buffer.gigabytesPerSecond(set);
 
