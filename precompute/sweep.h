@@ -65,8 +65,8 @@ class AttenuationSink {
   virtual void complete(int pass, int slab) = 0;
 };
 
-/// For each pass, what one plane passes on (precompute/sweep_kernels.h) along its nine directions that leave planes: dims.x * dims.y each, x
-/// fastest. Empty: 0.
+/// For each pass, what one plane passes on (precompute/sweep_kernels.h) along its nine directions that leave planes,
+/// ascending: dims.x * dims.y each, x fastest. Empty: 0.
 using BorderDepths = std::array<std::vector<FixedDepth>, kSweepPasses>;
 inline constexpr int kBorderDirections = 9;
 /// The direction that has place `i` in there.
