@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <tuple>
 
 #include "base/progress.h"
 #include "bench/fidelity/measured.h"
@@ -80,11 +81,28 @@ std::vector<Row> qualityRows(const std::vector<std::string>& wanted) {
   return rows;
 }
 
-Image pictureOf(const Row& row, Splatter& splatter, const Scene& scene, const Camera& view, const Folders& folders) {
-  if (row.splats) return resolve(splatter.render(view, *row.splats, silentProgress()).sums, row.splats->formula);
-  if (row.blended) return splatter.renderBlended(view, *row.blended, {}, silentProgress()).image;
-  return reference(scene, view, row.raycast, folders);
-}
+/// Draws a view once for all rows that differ only in how sums become a picture.
+class ViewPictures {
+ public:
+  ViewPictures(Splatter& splatter, const Scene& scene, const Camera& view, const Folders& folders)
+      : splatter_(splatter), scene_(scene), view_(view), folders_(folders) {}
+
+  Image of(const Row& row) {
+    if (row.blended) return splatter_.renderBlended(view_, *row.blended, {}, silentProgress()).image;
+    if (!row.splats) return reference(scene_, view_, row.raycast, folders_);
+    const bool paper = row.splats->formula == Formula::paper;
+    const auto [place, isNew] = drawn_.try_emplace({row.splats->footprint, row.splats->attenuation, paper});
+    if (isNew) place->second = splatter_.render(view_, *row.splats, silentProgress()).sums;
+    return resolve(place->second, row.splats->formula);
+  }
+
+ private:
+  Splatter& splatter_;
+  const Scene& scene_;
+  const Camera& view_;
+  const Folders& folders_;
+  std::map<std::tuple<Footprint, AttenuationSource, bool>, Sums> drawn_;
+};
 
 RaycastOptions converged(RaycastClassification classification) {
   RaycastOptions options;
@@ -145,22 +163,30 @@ void addQuality(QualityTables& tables, const Scene& scene, const TableOptions& o
     preReferences.push_back(reference(scene, view, pre, options.folders));
   }
   std::map<std::string, double> pooled;
+  std::vector<std::string> ofPost(rows.size()), ofPre(rows.size());
   for (const Classification classification : {Classification::voxel, Classification::preintegrated}) {
     const AttenuationFile file = attenuationFile(scene, classification, options.folders);
     Splatter splatter(scene.grid, &file, scene.transfer, Backend::cpu);
-    for (size_t r = 0; r < rows.size(); ++r) {
-      const Row& row = rows[r];
-      if (row.classification != classification) continue;
-      Measured fromPost, fromPre;
-      for (size_t i = 0; i < views.size(); ++i) {
-        const Image picture = pictureOf(row, splatter, scene, views[i], options.folders);
-        fromPost.add(compareImages(picture, postReferences[i]));
-        fromPre.add(compareImages(picture, preReferences[i]));
+    std::vector<Measured> fromPost(rows.size()), fromPre(rows.size());
+    for (size_t i = 0; i < views.size(); ++i) {
+      ViewPictures pictures(splatter, scene, views[i], options.folders);
+      for (size_t r = 0; r < rows.size(); ++r) {
+        if (rows[r].classification != classification) continue;
+        const Image picture = pictures.of(rows[r]);
+        fromPost[r].add(compareImages(picture, postReferences[i]));
+        fromPre[r].add(compareImages(picture, preReferences[i]));
       }
-      pooled[row.name] = fromPost.pooled();
-      tables.post.rows[r].push_back(fromPost.text());
-      tables.pre.rows[r].push_back(fromPre.text());
     }
+    for (size_t r = 0; r < rows.size(); ++r) {
+      if (rows[r].classification != classification) continue;
+      pooled[rows[r].name] = fromPost[r].pooled();
+      ofPost[r] = fromPost[r].text();
+      ofPre[r] = fromPre[r].text();
+    }
+  }
+  for (size_t r = 0; r < rows.size(); ++r) {
+    tables.post.rows[r].push_back(ofPost[r]);
+    tables.pre.rows[r].push_back(ofPre[r]);
   }
   addBars(tables.bars, scene, pooled);
 }
