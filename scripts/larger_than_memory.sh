@@ -68,8 +68,9 @@ cat <<TEXT
 
 Written by \`scripts/larger_than_memory.sh\`: a cloud of ${edge}^3 bytes to layout \`compact\`, under
 \`prlimit --data=$limit\` with \`--memory $limit\`, and without a limit. The two files are the same, byte by
-byte, but for the command that they name, and \`verify\` accepts them. *Data*: the most private memory claimed (VmData), *resident*: the most in memory at
-once, without the page cache (RssAnon), *shared*: anonymous shared memory (RssShmem); looked at five times a second.
+byte, but for the command that they name, and \`verify\` accepts them. *Data*: the most private memory claimed (VmData),
+*resident*: the most in memory at once, without the page cache (RssAnon), *shared*: anonymous shared memory (RssShmem);
+looked at five times a second.
 
 | run | seconds | data, MB | resident, MB | shared, MB | file, MB |
 |---|---:|---:|---:|---:|---:|
