@@ -9,6 +9,7 @@
 #include <limits>
 #include <regex>
 
+#include "base/address_sanitizer.h"
 #include "base/compare.h"
 #include "base/error.h"
 #include "tests/support/test_data.h"
@@ -141,6 +142,9 @@ void expectGracefulRead(const std::string& path, const std::string& what) {
   }
 }
 
+/// Every byte, but under the sanitizers only some: there an exception out of OpenEXR takes a tenth of a second.
+constexpr size_t kDamageStep = kUnderAddressSanitizer ? 13 : 1;
+
 class DamagedImage : public ::testing::TestWithParam<const char*> {
  protected:
   std::string write(const std::string& path) const {
@@ -158,7 +162,7 @@ TEST_P(DamagedImage, everyTruncationIsRefused) {
   const std::string path = test::temporaryFolder() + "/image." + GetParam();
   const std::string bytes = write(path);
   testing::internal::CaptureStderr();
-  for (size_t length = 0; length < bytes.size(); ++length) {
+  for (size_t length = 0; length < bytes.size(); length += kDamageStep) {
     test::writeBytes(path, bytes.substr(0, length));
     EXPECT_THROW(readImage(path), InputError) << length;
     expectGracefulRead(path, "length " + std::to_string(length));
@@ -170,7 +174,7 @@ TEST_P(DamagedImage, everyFlippedByteIsSurvived) {
   const std::string path = test::temporaryFolder() + "/image." + GetParam();
   const std::string bytes = write(path);
   testing::internal::CaptureStderr();
-  for (size_t i = 0; i < bytes.size(); ++i) {
+  for (size_t i = 0; i < bytes.size(); i += kDamageStep) {
     for (const unsigned flip : {0x01u, 0x80u, 0xffu}) {
       std::string damaged = bytes;
       damaged[i] = char(static_cast<unsigned char>(damaged[i]) ^ flip);
