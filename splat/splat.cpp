@@ -378,9 +378,10 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
       const AttenuationSource ofLamp = chosen(options.lightAttenuation, target, true);
       to.statistics.lightAttenuation = attenuationSourceName(ofLamp);
       LampSource lamp;
-      // Stored attenuation is traced near the voxel, pinned is swept: both are of the whole volume.
+      // What is traced near the voxel, and what is pinned or swept, is of the whole volume.
+      const bool nearField = ofLamp == AttenuationSource::stored && options.footprint == Footprint::cell;
       if (ofLamp == AttenuationSource::swept || ofLamp == AttenuationSource::pinned ||
-          ofLamp == AttenuationSource::stored) {
+          (nearField && options.lodPixels == 0.0)) {
         to.lampGrids[i] = lampGrid(target, ofLamp, options.footprint);
         lamp.swept = to.lampGrids[i].get();
         fixedBytes += voxelCount(dims) * sizeof(uint16_t);
