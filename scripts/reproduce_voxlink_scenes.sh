@@ -4,6 +4,7 @@
 #   scripts/reproduce_voxlink_scenes.sh build/release/bin/freevoxel [OUT_FOLDER]
 # docs/results/voxlink is the default. Frame rates are means over VIEWS views of a full turn about y and as many of one
 # about x. Without a GPU the CPU backend traces few and small views; the tables say so.
+#   PARTS="table1 table2 steps figures" names what to measure and draw, all of it by default;
 #   VIEWS=360 RESOLUTIONS="256 512 1024" SIZE=1000x1000 BACKEND=gl override what it chooses.
 . "$(dirname "$0")/voxlink_measuring.sh"
 out=${2:-$top/docs/results/voxlink}
@@ -15,102 +16,116 @@ printf 'x,y,z,radius\n0,0,0,1\n' >"$scratch/sphere.csv"
 turned="$machine, $size, mean of $((2 * views)) views of full turns about y and x, load average of $(nproc) cores at the
 start: $(load)"
 
+part() { [[ " ${PARTS:-table1 table2 steps figures} " == *" $1 "* ]]; }
+
 row() { # of the last trace: voxels, bricks, memory, bytes a voxel, frames and rays
   echo "$(value storedVoxels) $(value occupiedBricks) $(value bricks) $(value bufferBytes) \
     $(value bytesPerStoredVoxel) $(value framesPerSecond)" |
     awk '{printf "%.1f | %.1f %% | %.1f | %.1f | %.2f |\n", $1 / 1000, 100 * $2 / $3, $4 / 1048576, $5, $6}'
 }
 
-{
-  echo "Made by scripts/reproduce_voxlink_scenes.sh: $turned. The paper: 1000x1000, 720 views, a Quadro K6000; its meshes"
-  echo "are other cuts of the same models and its materials are not told."
-  echo
-  echo "| scene | render mode | resolution [brick] | voxels (1000) | non-empty bricks | memory, MiB | bytes a voxel | fps |"
-  echo "|---|---|---|---|---|---|---|---|"
-  for line in "Dragon|plain|256 [8]|81.6|5.0 %|9.4|121|307.8" "Dragon|plain|512 [8]|326.2|2.6 %|70.0|225|134.5" \
-    "Dragon|ray tracing|256 [8]|81.6|5.0 %|9.4|121|47.6" "Dragon|ray tracing|512 [8]|326.2|2.6 %|70.0|225|39.6" \
-    "House|ray tracing|256 [8]|560.0|18.8 %|16.7|31|45.2" "House|ray tracing|512 [8]|2319.3|12.2 %|100.0|45|38.8" \
-    "Bunny|ray tracing|256 [8]|139.2|6.9 %|10.2|77|37.3" "Bunny|ray tracing|512 [8]|557.3|3.6 %|73.5|138|26.4"; do
-    echo "| *paper:* ${line//|/ | } |"
-  done
-  for r in $resolutions; do
-    brick=$((r >= 1024 ? 16 : 8))
-    for mode in "dragon plain" "dragon ray tracing" "glass_house ray tracing" "glass_bunny ray tracing"; do
-      name=${mode%% *}
-      how=(--shadows rays)
-      [[ $mode == *plain ]] && how=(--shadows none --max-depth 0)
-      trace "$scenes/$name.json" --resolution "$r" --brick "$brick" --backend "$backend" "${how[@]}" --size "$size" \
-        --turn "$views"
-      echo "| $name | ${mode#* } | $r [$brick] | $(row)"
+table1() {
+  {
+    echo "Made by scripts/reproduce_voxlink_scenes.sh: $turned. The paper: 1000x1000, 720 views, a Quadro K6000; its meshes"
+    echo "are other cuts of the same models and its materials are not told."
+    echo
+    echo "| scene | render mode | resolution [brick] | voxels (1000) | non-empty bricks | memory, MiB | bytes a voxel | fps |"
+    echo "|---|---|---|---|---|---|---|---|"
+    for line in "Dragon|plain|256 [8]|81.6|5.0 %|9.4|121|307.8" "Dragon|plain|512 [8]|326.2|2.6 %|70.0|225|134.5" \
+      "Dragon|ray tracing|256 [8]|81.6|5.0 %|9.4|121|47.6" "Dragon|ray tracing|512 [8]|326.2|2.6 %|70.0|225|39.6" \
+      "House|ray tracing|256 [8]|560.0|18.8 %|16.7|31|45.2" "House|ray tracing|512 [8]|2319.3|12.2 %|100.0|45|38.8" \
+      "Bunny|ray tracing|256 [8]|139.2|6.9 %|10.2|77|37.3" "Bunny|ray tracing|512 [8]|557.3|3.6 %|73.5|138|26.4"; do
+      echo "| *paper:* ${line//|/ | } |"
     done
-  done
-} >"$out/table1.md"
-
-{
-  echo "Voxelised anew for every frame and traced: frames per second ($turned)."
-  echo
-  echo "| scene | resolution | brick 4 | brick 8 | brick 16 |"
-  echo "|---|---|---|---|---|"
-  echo "| *paper:* Dragon | 256 | 132.1 | 157.1 | 159.1 |"
-  echo "| *paper:* House | 256 | 29.4 | 29.6 | 29.5 |"
-  echo "| *paper:* Bunny | 256 | 20.5 | 21.0 | 20.7 |"
-  echo "| *paper:* Dragon | 512 | 62.1 | 76.5 | 81.1 |"
-  echo "| *paper:* House | 512 | 6.1 | 6.2 | 6.3 |"
-  echo "| *paper:* Bunny | 512 | 4.8 | 4.9 | 4.9 |"
-  for r in $resolutions; do
-    for name in dragon glass_house glass_bunny; do
-      cells=
-      for brick in 4 8 16; do
-        trace "$scenes/$name.json" --resolution "$r" --brick "$brick" --backend "$backend" --size "$size" \
-          --turn "$views" --revoxelise
-        cells+="$(value framesPerSecond | awk '{printf "%.2f", $1}') | "
+    for r in $resolutions; do
+      brick=$((r >= 1024 ? 16 : 8))
+      for mode in "dragon plain" "dragon ray tracing" "glass_house ray tracing" "glass_bunny ray tracing"; do
+        name=${mode%% *}
+        how=(--shadows rays)
+        [[ $mode == *plain ]] && how=(--shadows none --max-depth 0)
+        trace "$scenes/$name.json" --resolution "$r" --brick "$brick" --backend "$backend" "${how[@]}" --size "$size" \
+          --turn "$views"
+        echo "| $name | ${mode#* } | $r [$brick] | $(row)"
       done
-      echo "| $name | $r | $cells"
     done
-  done
-} >"$out/table2.md"
+  } >"$out/table1.md"
+}
+
+table2() {
+  {
+    echo "Voxelised anew for every frame and traced: frames per second ($turned)."
+    echo
+    echo "| scene | resolution | brick 4 | brick 8 | brick 16 |"
+    echo "|---|---|---|---|---|"
+    echo "| *paper:* Dragon | 256 | 132.1 | 157.1 | 159.1 |"
+    echo "| *paper:* House | 256 | 29.4 | 29.6 | 29.5 |"
+    echo "| *paper:* Bunny | 256 | 20.5 | 21.0 | 20.7 |"
+    echo "| *paper:* Dragon | 512 | 62.1 | 76.5 | 81.1 |"
+    echo "| *paper:* House | 512 | 6.1 | 6.2 | 6.3 |"
+    echo "| *paper:* Bunny | 512 | 4.8 | 4.9 | 4.9 |"
+    for r in $resolutions; do
+      for name in dragon glass_house glass_bunny; do
+        cells=
+        for brick in 4 8 16; do
+          trace "$scenes/$name.json" --resolution "$r" --brick "$brick" --backend "$backend" --size "$size" \
+            --turn "$views" --revoxelise
+          cells+="$(value framesPerSecond | awk '{printf "%.2f", $1}') | "
+        done
+        echo "| $name | $r | $cells"
+      done
+    done
+  } >"$out/table2.md"
+}
 
 # Steps per pass matter on the GPU only.
-small=$size
-((few)) && small=120x120
-{
-  echo "| steps per pass | passes | fps, glass_bunny 256 [8], $small |"
-  echo "|---|---|---|"
-  for n in 256 512 1024; do
-    trace "$scenes/glass_bunny.json" --resolution 256 --backend gl --steps "$n" --size "$small" --turn 1
-    printf '| %s | %s | %.2f |\n' "$n" "$(value passes)" "$(value framesPerSecond)"
-  done
-  echo
-  echo "OpenGL here: $(value glRenderer)"
-} >"$out/scene_steps.md"
-
-# Figure 6: the three scenes.
-for name in dragon glass_house glass_bunny; do
-  draw "$scenes/$name.json" --resolution 512 --size 480x360 -o "$scratch/$name.png"
-done
-"$program" sheet "$scratch"/{dragon,glass_house,glass_bunny}.png --columns 3 -o "$out/figure6.png"
-
-# Figure 7: how the frame rate depends on the angle, of one implicit sphere.
-turn=${TURN:-$((views < 12 ? 12 : views))}
-if command -v gnuplot >/dev/null; then
-  curves=()
-  for r in $resolutions; do
-    for brick in 4 8 16; do
-      trace "$scratch/sphere.csv" --resolution "$r" --brick "$brick" --backend "$backend" --turn "$turn" --size "$size"
-      frames | awk -v n="$turn" '{print (NR - 1) * 360 / n, 1 / $1}' >"$scratch/sphere$r.$brick"
-      curves+=("'$scratch/sphere$r.$brick' with linespoints title '$r [$brick]'")
+steps() {
+  small=$size
+  ((few)) && small=120x120
+  {
+    echo "| steps per pass | passes | fps, glass_bunny 256 [8], $small |"
+    echo "|---|---|---|"
+    for n in 256 512 1024; do
+      trace "$scenes/glass_bunny.json" --resolution 256 --backend gl --steps "$n" --size "$small" --turn 1
+      printf '| %s | %s | %.2f |\n' "$n" "$(value passes)" "$(value framesPerSecond)"
     done
+    echo
+    echo "OpenGL here: $(value glRenderer)"
+  } >"$out/scene_steps.md"
+}
+
+figures() {
+  # Figure 6: the three scenes.
+  for name in dragon glass_house glass_bunny; do
+    draw "$scenes/$name.json" --resolution 512 --size 480x360 -o "$scratch/$name.png"
   done
-  all=$(IFS=,; echo "${curves[*]}")
-  gnuplot <<PLOT
-set terminal pngcairo size 900,420
-set output '$out/figure7_sphere.png'
-set xlabel 'degrees about y, then about x'
-set ylabel 'frames per second ($size)'
-set xrange [0:720]
-set xtics 90
-set key outside
-plot $all
+  "$program" sheet "$scratch"/{dragon,glass_house,glass_bunny}.png --columns 3 -o "$out/figure6.png"
+
+  # Figure 7: how the frame rate depends on the angle, of one implicit sphere.
+  turn=${TURN:-$((views < 12 ? 12 : views))}
+  if command -v gnuplot >/dev/null; then
+    curves=()
+    for r in $resolutions; do
+      for brick in 4 8 16; do
+        trace "$scratch/sphere.csv" --resolution "$r" --brick "$brick" --backend "$backend" --turn "$turn" --size "$size"
+        frames | awk -v n="$turn" '{print (NR - 1) * 360 / n, 1 / $1}' >"$scratch/sphere$r.$brick"
+        curves+=("'$scratch/sphere$r.$brick' with linespoints title '$r [$brick]'")
+      done
+    done
+    all=$(IFS=,; echo "${curves[*]}")
+    gnuplot <<PLOT
+  set terminal pngcairo size 900,420
+  set output '$out/figure7_sphere.png'
+  set xlabel 'degrees about y, then about x'
+  set ylabel 'frames per second ($size)'
+  set xrange [0:720]
+  set xtics 90
+  set key outside
+  plot $all
 PLOT
-fi
+  fi
+}
+
+for what in table1 table2 steps figures; do
+  if part "$what"; then "$what"; fi
+done
 echo "tables and figures: $out"

@@ -6,7 +6,6 @@
 #include <glm/glm.hpp>
 
 #include "base/error.h"
-#include "base/light.h"
 
 namespace freevoxel {
 
@@ -198,11 +197,11 @@ uint32_t voxelNormal(const ValueGrid& grid, const glm::mat3& gradientMatrix, glm
     high[axis] = std::min(grid.dims[axis] - 1, voxel[axis] + 1);
     if (low[axis] == high[axis]) continue;
     perIndex[axis] =
-        (float(grid.codes[linearIndex(high, grid.dims)]) - float(grid.codes[linearIndex(low, grid.dims)])) /
-        float(high[axis] - low[axis]);
+        (float(grid.codes[linearIndex(high, grid.dims)]) - float(grid.codes[linearIndex(low, grid.dims)])) *
+        (high[axis] - low[axis] == 2 ? 0.5f : 1.0f);
   }
   const glm::vec3 gradient = gradientMatrix * perIndex;
-  return shared::packNormal(gradient.x, gradient.y, gradient.z, glm::length(gradient) / kSurfaceGradient);
+  return shared::packNormal(gradient.x, gradient.y, gradient.z, kPerSurface);
 }
 
 InputError nothingStored() {

@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/grid.h"
+#include "base/light.h"
 #include "base/placement.h"
 #include "hierarchy/value_grid.h"
 #include "shaders/shared/voxlink.h"
@@ -118,6 +119,9 @@ bool needsRebuild(const ValueGrid& grid, const std::vector<uint8_t>& built, cons
 /// Plain C++: counts, then fills. `stored` has one entry per code. Same bytes for any thread count.
 /// Throws InputError for a brick edge other than 4, 8, 16 and if nothing is stored.
 VoxLinkBuffers buildBuffers(const ValueGrid& grid, const std::vector<uint8_t>& stored, int brickEdge);
+
+/// As packNormal takes it.
+inline constexpr float kPerSurface = 1.0f / (kSurfaceGradient * kSurfaceGradient);
 
 /// The packed normal of a voxel (shared::packNormal): gradientAt's direction and strength. `gradientMatrix` is
 /// gradientFromDifferences.

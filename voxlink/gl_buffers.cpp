@@ -122,7 +122,7 @@ void GlVoxLink::build(const ValueGrid& grid, const std::vector<uint8_t>& stored,
   dispatchMany(fillBrickWords_, (wordCount + 63) / 64);
 
   setMatrix(fillBricks_, 4, gradientFromDifferences(grid));
-  glProgramUniform1f(fillBricks_.id(), 5, kSurfaceGradient);
+  glProgramUniform1f(fillBricks_.id(), 5, kPerSurface);
   for (int layer = bricks_.first.z; layer < bricks_.first.z + bricks_.count.z; ++layer) {
     uploadSlab(grid, layer);
     bindStorage({&slab_, &stored_, &counts_, &brickHeaders_, &fragments_});

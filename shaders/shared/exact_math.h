@@ -18,6 +18,57 @@ SHARED_FUNCTION float reciprocal(float x) {
   return r2;
 }
 
+// 1 / sqrt(x) for 2^-100 < x < 2^100, to about two units in the last place.
+SHARED_FUNCTION float reciprocalRoot(float x) {
+  EXACT float r = uintBitsToFloat(0x5f3759dfu - (floatBitsToUint(x) >> 1));
+  EXACT float half_ = 0.5f * x;
+  EXACT float e0 = 1.5f - half_ * r * r;
+  EXACT float r0 = r * e0;
+  EXACT float e1 = 1.5f - half_ * r0 * r0;
+  EXACT float r1 = r0 * e1;
+  EXACT float e2 = 1.5f - half_ * r1 * r1;
+  EXACT float r2 = r1 * e2;
+  return r2;
+}
+
+// Angles in radians, errors below 1e-6 (polynomials: Abramowitz and Stegun, 4.4.46 and 4.4.49).
+SHARED_FUNCTION float arcCosine(float x) {
+  EXACT float size = min(x < 0.0f ? -x : x, 1.0f);
+  EXACT float rest = 1.0f - size;
+  if (rest < 1e-7f) return x < 0.0f ? 3.14159265f : 0.0f;
+  EXACT float p6 = -0.0012624911f * size + 0.0066700901f;
+  EXACT float p5 = p6 * size - 0.0170881256f;
+  EXACT float p4 = p5 * size + 0.0308918810f;
+  EXACT float p3 = p4 * size - 0.0501743046f;
+  EXACT float p2 = p3 * size + 0.0889789874f;
+  EXACT float p1 = p2 * size - 0.2145988016f;
+  EXACT float p0 = p1 * size + 1.5707963050f;
+  EXACT float root = rest * reciprocalRoot(rest);
+  EXACT float angle = root * p0;
+  EXACT float other = 3.14159265f - angle;
+  return x < 0.0f ? other : angle;
+}
+// Of (x, y) from the x axis, -pi to pi; sizes 2^-60 to 2^60, or one of them 0.
+SHARED_FUNCTION float arcTangent(float y, float x) {
+  EXACT float right = x < 0.0f ? -x : x;
+  EXACT float front = y < 0.0f ? -y : y;
+  EXACT float t = min(right, front) * reciprocal(max(right, front));
+  EXACT float s = t * t;
+  EXACT float p7 = 0.0028662257f * s - 0.0161657367f;
+  EXACT float p6 = p7 * s + 0.0429096138f;
+  EXACT float p5 = p6 * s - 0.0752896400f;
+  EXACT float p4 = p5 * s + 0.1065626393f;
+  EXACT float p3 = p4 * s - 0.1420889944f;
+  EXACT float p2 = p3 * s + 0.1999355085f;
+  EXACT float p1 = p2 * s - 0.3333314528f;
+  EXACT float octant = t * (1.0f + s * p1);
+  EXACT float quadrant = 1.57079633f - octant;
+  EXACT float half_ = front > right ? quadrant : octant;
+  EXACT float other = 3.14159265f - half_;
+  EXACT float above = x < 0.0f ? other : half_;
+  return y < 0.0f ? -above : above;
+}
+
 // 1 - 2^-x for x >= 0, relative error below 2e-7 near 0 too. From 32 on it is 1.
 SHARED_FUNCTION float absorbed(float x) {
   EXACT float limited = min(x, 32.0f);

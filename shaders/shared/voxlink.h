@@ -9,6 +9,7 @@
 #ifndef FREEVOXEL_SHADERS_SHARED_VOXLINK_H
 #define FREEVOXEL_SHADERS_SHARED_VOXLINK_H
 
+#include "shaders/shared/exact_math.h"
 #include "shaders/shared/language.h"
 
 #ifdef __cplusplus
@@ -18,17 +19,8 @@
 FREEVOXEL_BEGIN_SHARED
 
 #ifdef __cplusplus
-using std::acos;
 using std::cos;
-using std::pow;
 using std::sin;
-inline float arcTangent(float y, float x) {
-  return std::atan2(y, x);
-}
-#else
-float arcTangent(float y, float x) {
-  return atan(y, x);
-}
 #endif
 
 // 32 bricks of the grid.
@@ -95,18 +87,27 @@ SHARED_FUNCTION uint fragmentNormal(uint fragment) {
 // Normals are polar, 16 bits: 7 of the angle from z, 7 of the angle about it, and 2 of how much of a surface it is,
 // 0 to 3 (base/light.h: where values hardly change there is none).
 SHARED_CONSTANT float kPi = 3.14159265f;
-SHARED_FUNCTION uint packNormal(float x, float y, float z, float surface) {
+// Of a gradient with its largest component below 2^60; `perSurface` is 1 over the square of the gradient that is all
+// surface. Every backend packs alike.
+SHARED_FUNCTION uint packNormal(float x, float y, float z, float perSurface) {
   float size = max(max(max(x, -x), max(y, -y)), max(z, -z));
-  if (!(size > 0.0f) || !(surface > 0.0f)) return 0u;
-  float sum = (x * x + y * y + z * z) / (size * size);
-  float cosine = z / size * (1.0f / pow(sum, 0.5f));
-  uint polar = uint(acos(min(max(cosine, -1.0f), 1.0f)) * (127.0f / kPi) + 0.5f);
-  // At the poles there is no azimuth, and GLSL leaves it open which one it tells.
-  float across = max(max(x, -x), max(y, -y)) / size;
-  float turn = across < 1e-6f ? 0.0f : arcTangent(y / size, x / size) * (64.0f / kPi);
-  uint azimuth = uint(turn < 0.0f ? turn + 128.5f : turn + 0.5f) & 127u;
-  uint strength = uint(min(surface, 1.0f) * 3.0f + 0.5f);
-  return polar | azimuth << 7 | strength << 14;
+  if (!(size > 8.7e-19f)) return 0u;  // 2^-60
+  EXACT float toOne = reciprocal(size);
+  EXACT float a = x * toOne;
+  EXACT float b = y * toOne;
+  EXACT float c = z * toOne;
+  EXACT float flat_ = a * a + b * b;
+  EXACT float sum = flat_ + c * c;
+  EXACT float cosine = c * reciprocalRoot(sum);
+  EXACT float polar = arcCosine(cosine) * (127.0f / kPi) + 0.5f;
+  // At the poles there is no azimuth.
+  EXACT float turn = flat_ < 1e-12f ? 0.0f : arcTangent(b, a) * (64.0f / kPi);
+  EXACT float azimuth = turn < 0.0f ? turn + 128.5f : turn + 0.5f;
+  // The squares of 1/6, 1/2 and 5/6 of a surface.
+  EXACT float square = x * x + y * y + z * z;
+  EXACT float share = square * perSurface;
+  uint strength = share < 0.0277777778f ? 0u : share < 0.25f ? 1u : share < 0.694444444f ? 2u : 3u;
+  return uint(polar) | (uint(azimuth) & 127u) << 7 | strength << 14;
 }
 SHARED_FUNCTION void unpackNormal(uint packed_, SHARED_OUT(float) x, SHARED_OUT(float) y, SHARED_OUT(float) z,
                                   SHARED_OUT(float) surface) {

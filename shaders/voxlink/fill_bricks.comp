@@ -8,7 +8,7 @@ layout(std430, binding = 3) writeonly buffer BrickHeaders { uint brickHeaders[];
 layout(std430, binding = 4) writeonly buffer Fragments { uint fragmentBuffer[]; };
 
 layout(location = 4) uniform mat3 gradientMatrix;
-layout(location = 5) uniform float surfaceGradient;
+layout(location = 5) uniform float perSurface;  // packNormal
 
 shared uint filled[64];
 shared uint headerPart[161];  // headerWords(16) are the most
@@ -18,7 +18,8 @@ float difference(ivec3 voxel, int axis) {
   low[axis] = max(0, voxel[axis] - 1);
   high[axis] = min(dims[axis] - 1, voxel[axis] + 1);
   if (low[axis] == high[axis]) return 0.0;
-  return (float(codeAt(high)) - float(codeAt(low))) / float(high[axis] - low[axis]);
+  float between = high[axis] - low[axis] == 2 ? 0.5 : 1.0;
+  return (float(codeAt(high)) - float(codeAt(low))) * between;
 }
 
 void main() {
@@ -53,8 +54,11 @@ void main() {
     if (bit % 64 == 0) atomicOr(headerPart[startWord(edge, bit)], at << startShift(bit));
     for (; mask != 0u; mask &= mask - 1u) {
       ivec3 voxel = origin + ivec3(column % edge, column / edge, findLSB(mask));
-      vec3 gradient = gradientMatrix * vec3(difference(voxel, 0), difference(voxel, 1), difference(voxel, 2));
-      uint normal = packNormal(gradient.x, gradient.y, gradient.z, length(gradient) / surfaceGradient);
+      float dx = difference(voxel, 0), dy = difference(voxel, 1), dz = difference(voxel, 2);
+      precise float x = gradientMatrix[0].x * dx + gradientMatrix[1].x * dy + gradientMatrix[2].x * dz;
+      precise float y = gradientMatrix[0].y * dx + gradientMatrix[1].y * dy + gradientMatrix[2].y * dz;
+      precise float z = gradientMatrix[0].z * dx + gradientMatrix[1].z * dy + gradientMatrix[2].z * dz;
+      uint normal = packNormal(x, y, z, perSurface);
       fragmentBuffer[start.y + at] = fragmentOf(codeAt(voxel), normal);
       ++at;
     }

@@ -52,18 +52,19 @@ TrianglePart partOf(uint number, ivec3 voxel) {
   SnappedTriangle t = triangles[number];
   int axis = int(t.axis), u = (axis + 1) % 3, v = (axis + 2) % 3;
   ivec3 centre = voxel * kSubvoxels + kHalf;
-  int64_t wide[3] = int64_t[3](normalOf(t, 0), normalOf(t, 1), normalOf(t, 2));
-  int shift = bitsOf(wide[axis]) - 15;
-  ivec3 normal = ivec3(shifted(wide[0], shift), shifted(wide[1], shift), shifted(wide[2], shift));
+  WideNormal wide = normalOf(t);
+  int64_t facing = along(wide, axis);
+  int shift = bitsOf(facing) - 15;
+  ivec3 normal = ivec3(shifted(wide.x, shift), shifted(wide.y, shift), shifted(wide.z, shift));
   TrianglePart part;
   part.slopeU = slopeOf(normal[u], normal[axis]);
   part.slopeV = slopeOf(normal[v], normal[axis]);
   part.height = heightOf(shifted(-aboveOf(t, wide, centre), shift), normal[axis]);
   part.normal = scaledTo11Bits(normal);
   if (hasNormals == 0) return part;
-  int64_t whole = magnitude(wide[axis]);
+  int64_t whole = magnitude(facing);
   int weightShift = max(0, bitsOf(whole) - 15);
-  int turn = wide[axis] < 0 ? -1 : 1;
+  int turn = facing < 0 ? -1 : 1;
   ivec3 sum = ivec3(0);
   for (int k = 0; k < 3; ++k) {
     int a = (k + 1) % 3, b = (k + 2) % 3;

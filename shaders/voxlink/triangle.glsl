@@ -14,6 +14,14 @@ int placeOf(SnappedTriangle t, int vertex, int axis) {
   return t.place[3 * vertex + axis];
 }
 
+// Not an array: drivers have failed to index arrays of 64-bit integers.
+struct WideNormal {
+  int64_t x, y, z;
+};
+int64_t along(WideNormal normal, int axis) {
+  return axis == 0 ? normal.x : axis == 1 ? normal.y : normal.z;
+}
+
 int64_t magnitude(int64_t x) {
   return x < 0 ? -x : x;
 }
@@ -22,6 +30,10 @@ int64_t normalOf(SnappedTriangle t, int axis) {
   int u = (axis + 1) % 3, v = (axis + 2) % 3;
   return int64_t(placeOf(t, 1, u) - placeOf(t, 0, u)) * int64_t(placeOf(t, 2, v) - placeOf(t, 0, v)) -
          int64_t(placeOf(t, 1, v) - placeOf(t, 0, v)) * int64_t(placeOf(t, 2, u) - placeOf(t, 0, u));
+}
+
+WideNormal normalOf(SnappedTriangle t) {
+  return WideNormal(normalOf(t, 0), normalOf(t, 1), normalOf(t, 2));
 }
 
 ivec3 lowOf(SnappedTriangle t) {
@@ -58,15 +70,15 @@ bool touchesAlong(SnappedTriangle t, int axis, int64_t normal, ivec3 centre) {
 }
 
 // The normal's product with the way from the first vertex to a place.
-int64_t aboveOf(SnappedTriangle t, int64_t normal[3], ivec3 place) {
-  return normal[0] * int64_t(place.x - t.place[0]) + normal[1] * int64_t(place.y - t.place[1]) +
-         normal[2] * int64_t(place.z - t.place[2]);
+int64_t aboveOf(SnappedTriangle t, WideNormal normal, ivec3 place) {
+  return normal.x * int64_t(place.x - t.place[0]) + normal.y * int64_t(place.y - t.place[1]) +
+         normal.z * int64_t(place.z - t.place[2]);
 }
 
-bool touches(SnappedTriangle t, int64_t normal[3], ivec3 low, ivec3 high, ivec3 voxel) {
+bool touches(SnappedTriangle t, WideNormal normal, ivec3 low, ivec3 high, ivec3 voxel) {
   ivec3 centre = voxel * kSubvoxels + kHalf;
   if (any(greaterThan(centre - kHalf, high)) || any(lessThan(centre + kHalf, low))) return false;
-  int64_t radius = int64_t(kHalf) * (magnitude(normal[0]) + magnitude(normal[1]) + magnitude(normal[2]));
-  return magnitude(aboveOf(t, normal, centre)) <= radius && touchesAlong(t, 0, normal[0], centre) &&
-         touchesAlong(t, 1, normal[1], centre) && touchesAlong(t, 2, normal[2], centre);
+  int64_t radius = int64_t(kHalf) * (magnitude(normal.x) + magnitude(normal.y) + magnitude(normal.z));
+  return magnitude(aboveOf(t, normal, centre)) <= radius && touchesAlong(t, 0, normal.x, centre) &&
+         touchesAlong(t, 1, normal.y, centre) && touchesAlong(t, 2, normal.z, centre);
 }

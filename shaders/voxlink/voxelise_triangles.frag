@@ -14,14 +14,15 @@ void main() {
   int u = (axis + 1) % 3, v = (axis + 2) % 3;
   ivec3 low = lowOf(t), high = highOf(t);
   ivec3 first = firstVoxel(low), last = lastVoxel(high, dims);
-  int64_t normal[3] = int64_t[3](normalOf(t, 0), normalOf(t, 1), normalOf(t, 2));
+  WideNormal normal = normalOf(t);
+  int64_t facing = along(normal, axis);
   // From the column's pixel to VoxLink space.
   ivec3 voxel = first;
   voxel[u] = int(gl_FragCoord.x);
   voxel[v] = int(gl_FragCoord.y);
   ivec3 centre = voxel * kSubvoxels + kHalf;
-  if (!touchesAlong(t, axis, normal[axis], centre)) return;
-  float height = -float(aboveOf(t, normal, centre)) / float(normal[axis]);
+  if (!touchesAlong(t, axis, facing, centre)) return;
+  float height = -float(aboveOf(t, normal, centre)) / float(facing);
   int middle = int(floor((float(centre[axis]) + height) / float(kSubvoxels)));
   int end = min(last[axis], middle + 2);
   for (int w = max(first[axis], middle - 2); w <= end; ++w) {

@@ -9,6 +9,20 @@
 namespace freevoxel {
 namespace {
 
+TEST(Arcs, AreWithinTwoMillionths) {
+  for (int i = -2000; i <= 2000; ++i) {
+    const float x = float(i) / 2000.0f;
+    EXPECT_NEAR(shared::arcCosine(x), std::acos(double(x)), 2e-6) << x;
+    const float turn = 0.0015707f * float(i);
+    const float size = i % 3 == 0 ? 1e-15f : i % 3 == 1 ? 1.0f : 1e15f;
+    const float y = size * std::sin(turn);
+    EXPECT_NEAR(shared::arcTangent(y, size * std::cos(turn)), turn, 2e-6);
+  }
+  EXPECT_EQ(shared::arcTangent(0.0f, 1.0f), 0.0f);
+  EXPECT_NEAR(shared::arcTangent(1.0f, 0.0f), 1.5707963, 2e-6);
+  EXPECT_NEAR(shared::arcTangent(0.0f, -1.0f), 3.1415926, 2e-6);
+}
+
 // Polar angles are 180 / 127 degrees apart, azimuths 360 / 128: at most 0.71 and 1.41 degrees are lost.
 TEST(PackedNormal, IsWithinTwoDegrees) {
   double worst = 1.0;
@@ -19,8 +33,9 @@ TEST(PackedNormal, IsWithinTwoDegrees) {
     float surface = 0.0f;
     // Any length will do.
     const float length = i % 2 == 0 ? 1e-12f : 3e7f;
-    shared::unpackNormal(shared::packNormal(length * normal.x, length * normal.y, length * normal.z, 5.0f), back.x,
-                         back.y, back.z, surface);
+    shared::unpackNormal(
+        shared::packNormal(length * normal.x, length * normal.y, length * normal.z, 5.0f / (length * length)), back.x,
+        back.y, back.z, surface);
     worst = std::min(worst, double(glm::dot(normal, back)));
     EXPECT_EQ(surface, 1.0f);
     EXPECT_NEAR(glm::length(back), 1.0, 1e-5);
@@ -31,7 +46,7 @@ TEST(PackedNormal, IsWithinTwoDegrees) {
 TEST(PackedNormal, StrengthHasFourLevels) {
   for (const float strength : {0.1f, 0.3f, 0.5f, 0.8f, 1.0f, 9.0f}) {
     float x, y, z, surface;
-    shared::unpackNormal(shared::packNormal(0.0f, 1.0f, 0.0f, strength), x, y, z, surface);
+    shared::unpackNormal(shared::packNormal(0.0f, 1.0f, 0.0f, strength * strength), x, y, z, surface);
     EXPECT_NEAR(surface, std::min(strength, 1.0f), 1.0f / 6.0f + 1e-6f);
   }
   EXPECT_EQ(shared::packNormal(0.0f, 0.0f, 0.0f, 1.0f), 0u) << "no gradient";
