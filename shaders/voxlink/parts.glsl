@@ -48,33 +48,36 @@ ivec3 vertexNormal(uint vertex) {
                snapped(normals[3u * vertex + 2u], 0.0, 1024.0));
 }
 
+int weightOf(ivec3 a, ivec3 b, ivec3 centre, int turn, int64_t whole, int shift) {
+  int64_t inside = int64_t(turn) * determinant(b.x - a.x, b.y - a.y, centre.x - a.x, centre.y - a.y);
+  if (inside < 0) inside = int64_t(0);
+  if (inside > whole) inside = whole;
+  return shifted(inside, shift);
+}
+
 TrianglePart partOf(uint number, ivec3 voxel) {
   SnappedTriangle t = triangles[number];
-  int axis = int(t.axis), u = (axis + 1) % 3, v = (axis + 2) % 3;
+  int axis = int(t.axis);
   ivec3 centre = voxel * kSubvoxels + kHalf;
-  WideNormal wide = normalOf(t);
+  WideVector wide = normalOf(t);
   int64_t facing = along(wide, axis);
   int shift = bitsOf(facing) - 15;
   ivec3 normal = ivec3(shifted(wide.x, shift), shifted(wide.y, shift), shifted(wide.z, shift));
+  ivec3 slope = turned(normal, axis);
   TrianglePart part;
-  part.slopeU = slopeOf(normal[u], normal[axis]);
-  part.slopeV = slopeOf(normal[v], normal[axis]);
-  part.height = heightOf(shifted(-aboveOf(t, wide, centre), shift), normal[axis]);
+  part.slopeU = slopeOf(slope.x, slope.z);
+  part.slopeV = slopeOf(slope.y, slope.z);
+  part.height = heightOf(shifted(-aboveOf(t, wide, centre), shift), slope.z);
   part.normal = scaledTo11Bits(normal);
   if (hasNormals == 0) return part;
   int64_t whole = magnitude(facing);
   int weightShift = max(0, bitsOf(whole) - 15);
   int turn = facing < 0 ? -1 : 1;
-  ivec3 sum = ivec3(0);
-  for (int k = 0; k < 3; ++k) {
-    int a = (k + 1) % 3, b = (k + 2) % 3;
-    int64_t inside =
-        int64_t(turn) * (int64_t(placeOf(t, b, u) - placeOf(t, a, u)) * int64_t(centre[v] - placeOf(t, a, v)) -
-                         int64_t(placeOf(t, b, v) - placeOf(t, a, v)) * int64_t(centre[u] - placeOf(t, a, u)));
-    if (inside < 0) inside = int64_t(0);
-    if (inside > whole) inside = whole;
-    sum += shifted(inside, weightShift) * vertexNormal(corners[3u * number + uint(k)]);
-  }
+  ivec3 place = turned(centre, axis);
+  ivec3 a = turned(vertexOf(t, 0), axis), b = turned(vertexOf(t, 1), axis), c = turned(vertexOf(t, 2), axis);
+  ivec3 sum = weightOf(b, c, place, turn, whole, weightShift) * vertexNormal(corners[3u * number]) +
+              weightOf(c, a, place, turn, whole, weightShift) * vertexNormal(corners[3u * number + 1u]) +
+              weightOf(a, b, place, turn, whole, weightShift) * vertexNormal(corners[3u * number + 2u]);
   if (sum != ivec3(0)) part.normal = scaledTo11Bits(sum);
   return part;
 }

@@ -23,10 +23,11 @@ void main() {
     for (int axis = 0; axis < 3; ++axis)
       t.place[3 * corner + axis] = snapped(positions[3u * vertex + uint(axis)], origin[axis], scale);
   }
-  int64_t longest = normalOf(t, 0);
+  WideVector normal = normalOf(t);
+  int64_t longest = normal.x;
   t.axis = 0u;
   for (int axis = 1; axis < 3; ++axis) {
-    int64_t other = normalOf(t, axis);
+    int64_t other = along(normal, axis);
     if (magnitude(other) > magnitude(longest)) {
       longest = other;
       t.axis = uint(axis);

@@ -11,22 +11,20 @@ flat in uint number;
 
 void main() {
   SnappedTriangle t = triangles[number];
-  int u = (axis + 1) % 3, v = (axis + 2) % 3;
   ivec3 low = lowOf(t), high = highOf(t);
   ivec3 first = firstVoxel(low), last = lastVoxel(high, dims);
-  WideNormal normal = normalOf(t);
+  WideVector normal = normalOf(t);
   int64_t facing = along(normal, axis);
   // From the column's pixel to VoxLink space.
-  ivec3 voxel = first;
-  voxel[u] = int(gl_FragCoord.x);
-  voxel[v] = int(gl_FragCoord.y);
-  ivec3 centre = voxel * kSubvoxels + kHalf;
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  int bottom = along(first, axis), top = along(last, axis);
+  ivec3 centre = turnedBack(ivec3(pixel, bottom), axis) * kSubvoxels + kHalf;
   if (!touchesAlong(t, axis, facing, centre)) return;
   float height = -float(aboveOf(t, normal, centre)) / float(facing);
-  int middle = int(floor((float(centre[axis]) + height) / float(kSubvoxels)));
-  int end = min(last[axis], middle + 2);
-  for (int w = max(first[axis], middle - 2); w <= end; ++w) {
-    voxel[axis] = w;
+  int middle = int(floor((float(along(centre, axis)) + height) / float(kSubvoxels)));
+  int end = min(top, middle + 2);
+  for (int w = max(bottom, middle - 2); w <= end; ++w) {
+    ivec3 voxel = turnedBack(ivec3(pixel, w), axis);
     if (touches(t, normal, low, high, voxel)) emit(voxel, t.key, number);
   }
 }

@@ -16,12 +16,11 @@ void main() {
   SnappedTriangle t = triangles[number];
   gl_Position = vec4(2.0, 2.0, 2.0, 1.0);  // outside
   if (t.axis != uint(axis)) return;
-  int u = (axis + 1) % 3, v = (axis + 2) % 3;
-  ivec3 first = firstVoxel(lowOf(t)), last = lastVoxel(highOf(t), dims);
+  ivec3 first = turned(firstVoxel(lowOf(t)), axis), last = turned(lastVoxel(highOf(t), dims), axis);
   // A quarter of a pixel beyond the first's and the last's centres, clear of all others.
   bool right = corner == 1 || corner == 2 || corner == 4;
   bool top = corner == 2 || corner == 4 || corner == 5;
-  vec2 pixel = vec2(right ? float(last[u]) + 0.75 : float(first[u]) + 0.25,
-                    top ? float(last[v]) + 0.75 : float(first[v]) + 0.25);
-  gl_Position = vec4(2.0 * pixel / vec2(dims[u], dims[v]) - 1.0, 0.0, 1.0);
+  vec2 pixel = vec2(right ? float(last.x) + 0.75 : float(first.x) + 0.25,
+                    top ? float(last.y) + 0.75 : float(first.y) + 0.25);
+  gl_Position = vec4(2.0 * pixel / vec2(turned(dims, axis).xy) - 1.0, 0.0, 1.0);
 }
