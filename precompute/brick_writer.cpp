@@ -107,9 +107,10 @@ void BrickWriter::complete(int pass, int slab) {
   failure.rethrow();
   store_.endSlab();
   if (levels_ != nullptr) {
-    const int first = slab * edge_, count = std::min(edge_, dims_.z - first);
+    const PlaneRange around = planesOfSlab(dims_, edge_, slab);
     levels_->addDepths(pass, slab,
-                       levels_->weighted() ? codes_->planes(pass, first, count) : std::span<const uint16_t>());
+                       levels_->weighted() ? codes_->planes(pass, around.first, around.last - around.first)
+                                           : std::span<const uint16_t>());
   }
   const glm::ivec3 slabDims(dims_.x, dims_.y, std::min(edge_, dims_.z - slab * edge_));
   const bool last = pass == 0 ? size_t(slab) + 1 == slabs_.size() : slab == 0;

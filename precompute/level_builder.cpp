@@ -21,9 +21,6 @@ namespace {
 
 constexpr size_t kMatter = 0;  // sections by number; attenuation of pass p is 1 + p
 
-/// Less than any transmittance that could be told from it: keeps logarithms finite.
-constexpr float kLeastTransmittance = 1e-30f;
-
 size_t cube(int edge) {
   return size_t(edge) * size_t(edge) * size_t(edge);
 }
@@ -45,50 +42,16 @@ std::vector<uint64_t> indicesOf(std::span<const StoredBrick> bricks) {
 
 }  // namespace
 
-LevelMatter reducedMatter(const std::array<const LevelMatter*, 8>& children, glm::vec3 edges) {
-  LevelMatter result;
-  float weights = 0.0f;
-  for (const LevelMatter* child : children) {
-    if (child == nullptr) continue;
-    result.glow += child->glow;
-    weights += child->extinction;
-  }
-  if (weights <= 0.0f) return {};
-  for (int axis = 0; axis < 3; ++axis) {
-    const size_t along = size_t(1) << axis, b = size_t(1) << (axis + 1) % 3, c = size_t(1) << (axis + 2) % 3;
-    float transmittance = 0.0f;
-    int columns = 0, length = 1;
-    for (size_t column = 0; column < 4; ++column) {
-      const size_t first = (column & 1 ? b : 0) + (column & 2 ? c : 0);
-      if (children[first] == nullptr) continue;
-      float depth = children[first]->extinction;
-      if (const LevelMatter* second = children[first + along]) {
-        depth += second->extinction;
-        length = 2;
-      }
-      transmittance += std::exp(-depth * edges[axis]);
-      ++columns;
-    }
-    const float mean = std::max(transmittance / float(columns), kLeastTransmittance);
-    result.extinction = std::max(result.extinction, -std::log(mean) / (float(length) * edges[axis]));
-  }
-  // `glow` is a sum of colours times extinctions so far.
-  result.glow *= result.extinction / weights;
-  return result;
-}
-
 LevelBuilder::LevelBuilder(AtomicFile& file, const std::array<uint64_t, 3>& offsets, const Shape& shape,
                            std::span<const StoredBrick> bricks, const TransferFunction& transfer,
                            const ValueCoding& coding)
-    : file_(file), shape_(shape) {
+    : file_(file), shape_(shape), finest_(transfer, coding) {
   check(shape.levels >= 2 && shape.levels <= mostHierarchyLevels(shape.dims, shape.brickEdge),
         "number of levels is in range");
   for (size_t which = 0; which < sections_.size(); ++which)
     sections_[which].offset = offsets[which];
   for (uint32_t code = 0; code <= coding.largest; ++code) {
-    const Classified at = transfer.at(coding.decode(code));
-    ofCode_.push_back({at.linear * at.extinction, at.extinction});
-    weights_.push_back(-std::expm1(-at.extinction));
+    weights_.push_back(-std::expm1(-transfer.at(coding.decode(code)).extinction));
   }
   std::vector<uint64_t> indices = indicesOf(bricks);
   const int order = brickCurveOrder(shape.dims, shape.brickEdge);
@@ -174,32 +137,44 @@ LevelBuilder::MatterPlanes LevelBuilder::coarser(const MatterPlanes& finer, int 
   return result;
 }
 
-LevelBuilder::MatterPlanes LevelBuilder::matterOfCodes(std::span<const uint16_t> codes, int planes) const {
-  const glm::ivec3 fine(shape_.dims.x, shape_.dims.y, planes);
+LevelBuilder::MatterPlanes LevelBuilder::matterOfCodes(int slab, std::span<const uint16_t> codes) const {
+  const PlaneRange around = planesOfSlab(shape_.dims, shape_.brickEdge, slab);
+  const int first = slab * shape_.brickEdge, planes = std::min(shape_.brickEdge, shape_.dims.z - first);
+  const glm::ivec3 given(shape_.dims.x, shape_.dims.y, around.last - around.first);
+  checkEqual(codes.size(), voxelCount(given), "codes of a slab and of the planes beside it");
   MatterPlanes result;
-  result.dims = (fine + 1) / 2;
+  result.dims = (glm::ivec3(shape_.dims.x, shape_.dims.y, planes) + 1) / 2;
   result.voxels.resize(voxelCount(result.dims));
 #pragma omp parallel for schedule(dynamic, 1)
   for (int row = 0; row < result.dims.y * result.dims.z; ++row) {
     const int y = row % result.dims.y, z = row / result.dims.y;
+    // The four planes and rows that the two of the row lie between; along x voxels follow on one another.
+    const uint16_t* rows[16];
+    for (int i = 0; i < 16; ++i) {
+      const int py = std::clamp(2 * y - 1 + i % 4, 0, given.y - 1);
+      const int pz = std::clamp(first + 2 * z - 1 + i / 4 - around.first, 0, given.z - 1);
+      rows[i] = codes.data() + linearIndex({0, py, pz}, given);
+    }
+    const glm::ivec3 left(shape_.dims.x, shape_.dims.y - 2 * y, planes - 2 * z);
     for (int x = 0; x < result.dims.x; ++x) {
+      FinestMatter::Codes around8;
+      for (int i = 0; i < 64; ++i)
+        around8[size_t(i)] = rows[i / 4][std::clamp(2 * x - 1 + i % 4, 0, given.x - 1)];
+      std::array<LevelMatter, 8> matter;
+      if (!finest_.ofEight(around8, matter)) continue;
       std::array<const LevelMatter*, 8> children{};
-      bool visible = false;
       for (size_t child = 0; child < 8; ++child) {
-        const glm::ivec3 p = 2 * glm::ivec3(x, y, z) + glm::ivec3(child & 1, child >> 1 & 1, child >> 2);
-        if (p.x >= fine.x || p.y >= fine.y || p.z >= fine.z) continue;
-        children[child] = &ofCode_[codes[linearIndex(p, fine)]];
-        visible = visible || children[child]->extinction > 0.0f;
+        const glm::ivec3 p(2 * x + int(child & 1), int(child >> 1 & 1), int(child >> 2));
+        if (p.x < left.x && p.y < left.y && p.z < left.z) children[child] = &matter[child];
       }
-      if (visible) result.voxels[linearIndex({x, y, z}, result.dims)] = reducedMatter(children, shape_.edges);
+      result.voxels[linearIndex({x, y, z}, result.dims)] = reducedMatter(children, shape_.edges);
     }
   }
   return result;
 }
 
 void LevelBuilder::addCodes(int slab, std::span<const uint16_t> codes) {
-  const int planes = std::min(shape_.brickEdge, shape_.dims.z - slab * shape_.brickEdge);
-  MatterPlanes matter = matterOfCodes(codes, planes);
+  MatterPlanes matter = matterOfCodes(slab, codes);
   for (int level = 1;; ++level) {
     const int firstPlane = slab * (shape_.brickEdge >> level);
     storeMatter(level, firstPlane, matter);
@@ -274,7 +249,7 @@ void LevelBuilder::addDepths(int pass, int slab, std::span<const uint16_t> codes
   for (size_t k = 0; k < kDirectionsPerSection; ++k)
     std::copy_n(tapped_[size_t(pass)].data() + k * reserved, voxels, depths.data() + k * voxels);
   MatterPlanes matter;
-  if (weighted()) matter = matterOfCodes(codes, planes);
+  if (weighted()) matter = matterOfCodes(slab, codes);
   for (int level = 1;; ++level) {
     const int firstPlane = slab * (shape_.brickEdge >> level);
     storeDepths(pass, level, firstPlane, dims, depths);

@@ -9,27 +9,15 @@
 
 #include "base/atomic_file.h"
 #include "precompute/brick_frames.h"
+#include "precompute/finest_matter.h"
 #include "precompute/format.h"
+#include "precompute/level_matter.h"
 #include "precompute/level_tap.h"
 #include "precompute/stored_bricks.h"
 #include "volume/transfer_function.h"
 #include "volume/value_codes.h"
 
 namespace freevoxel {
-
-/// What a voxel of a coarser level is made of.
-struct LevelMatter {
-  glm::vec3 glow{0.0f};     ///< linear colour times extinction
-  float extinction = 0.0f;  ///< natural, per shortest edge of the finest level
-};
-
-/// The matter that stands for eight voxels, or for those of them that exist: `children[x + 2 y + 4 z]`, null where
-/// there is none. `edges`: of a child, in shortest edges of the finest level.
-///
-/// Extinction is -ln(mean transmittance of the columns) along the axis that lets least through, so that an opaque sheet
-/// stays opaque however thin it is; a mean of extinctions would be more opaque still where only some columns are.
-/// Colours count by extinction.
-LevelMatter reducedMatter(const std::array<const LevelMatter*, 8>& children, glm::vec3 edges);
 
 /// Takes codes and depths of the finest level, slab of bricks by slab, and writes the bricks of all others. Holds, of
 /// every level, the bricks of one layer for each pass under way: levelBytes().
@@ -48,11 +36,11 @@ class LevelBuilder {
   LevelBuilder(AtomicFile& file, const std::array<uint64_t, 3>& offsets, const Shape& shape,
                std::span<const StoredBrick> bricks, const TransferFunction& transfer, const ValueCoding& coding);
 
-  /// Codes of the planes of one slab; slabs ascend. Throws MachineError.
+  /// Codes of the planes of one slab and of those beside it (planesOfSlab); slabs ascend. Throws MachineError.
   void addCodes(int slab, std::span<const uint16_t> codes);
   /// Where a sweep is to put level 1 of a slab.
   LevelTarget target(int pass);
-  /// It is there. `codes` of the slab; only `weighted` looks at them. Slabs come in the order of the pass. Throws
+  /// It is there. `codes` as of addCodes; only `weighted` looks at them. Slabs come in the order of the pass. Throws
   /// MachineError.
   void addDepths(int pass, int slab, std::span<const uint16_t> codes);
 
@@ -94,7 +82,8 @@ class LevelBuilder {
   using MatterPlanes = Planes<LevelMatter>;
 
   int topInSlab() const;  ///< the coarsest level of which a slab has whole planes
-  Planes<LevelMatter> matterOfCodes(std::span<const uint16_t> codes, int planes) const;
+  /// Level 1 of a slab. `codes` as of addCodes.
+  MatterPlanes matterOfCodes(int slab, std::span<const uint16_t> codes) const;
   MatterPlanes coarser(const MatterPlanes& finer, int level) const;
   std::vector<LevelDepth> coarser(const std::vector<LevelDepth>& finer, glm::ivec3 dims,
                                   const std::vector<float>& weights, glm::ivec3 coarseDims) const;
@@ -109,7 +98,7 @@ class LevelBuilder {
 
   AtomicFile& file_;
   Shape shape_;
-  std::vector<LevelMatter> ofCode_;
+  FinestMatter finest_;
   std::vector<float> weights_;  ///< opacity of one edge, by code
   std::vector<Level> levels_;   ///< [0] unused
   std::vector<LevelEntry> entries_;

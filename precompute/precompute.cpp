@@ -212,9 +212,10 @@ void fillStore(BrickStore& store, const VolumeHeader& header, const TransferFunc
   for (int slab = 0; slab < brickDims(header.dims, options.brickEdge).z; ++slab) {
     const int first = slab * options.brickEdge;
     const int count = std::min(options.brickEdge, header.dims.z - first);
-    const std::span<const uint16_t> ofSlab = codes.planes(0, first, count);
-    writer.writeCodes(slab, ofSlab, survey.coding);
-    if (levels != nullptr) levels->addCodes(slab, ofSlab);
+    writer.writeCodes(slab, codes.planes(0, first, count), survey.coding);
+    if (levels == nullptr) continue;
+    const PlaneRange around = planesOfSlab(header.dims, options.brickEdge, slab);
+    levels->addCodes(slab, codes.planes(0, around.first, around.last - around.first));
   }
   if (levels != nullptr) writer.buildLevels(*levels, codes);
   const auto segments = makeSegmentDepth(options.classification, transfer, survey.coding);
@@ -381,7 +382,9 @@ uint64_t passBytes(const VolumeHeader& header, const PrecomputeOptions& options,
   const LevelBuilder::Shape shape = levelShape(header, options);
   // A brick of level 1 stands for up to eight.
   const uint64_t levels =
-      shape.levels > 1 ? LevelBuilder::memoryBytes(shape, passCount) + bricks * (sizeof(LevelEntry) + 64) : 0;
+      shape.levels > 1 ? LevelBuilder::memoryBytes(shape, passCount) + bricks * (sizeof(LevelEntry) + 64) +
+                             uint64_t(passCount) * 2 * planeVoxels  // levels take planes to either side of a slab
+                       : 0;
   return bricks * kBytesPerBrick + frames + levels +
          uint64_t(passCount) * (window + slabBricks * kDirectionsPerSection * brickVoxels) +
          sweepBytes(header.dims, edge, passCount, omp_get_max_threads());

@@ -10,8 +10,8 @@ layout(std430, binding = 2) readonly buffer Samples { uint samples[]; };
 layout(std430, binding = 3) readonly buffer Lights { uvec2 lights[]; };
 layout(std430, binding = 4) readonly buffer Integral { vec4 integral[]; };
 layout(std430, binding = 5) readonly buffer Density { vec4 density[]; };
-// Of blocks of levels from 1 on: colour times extinction, extinction.
-layout(std430, binding = 6) readonly buffer Matter { vec4 matter[]; };
+// Of blocks of levels from 1 on.
+layout(std430, binding = 6) readonly buffer Cover { CoverValue cover[]; };
 
 layout(location = 1) uniform int imageWidth;
 layout(location = 2) uniform float entriesPerCode;
@@ -45,10 +45,7 @@ void blockLight(BlockStart start, int voxel, out float red, out float green, out
   green = value.y;
   blue = value.z;
 }
-TableValue blockMatter(BlockStart start, int voxel) {
-  vec4 m = matter[start.matter + voxel];
-  return TableValue(m.x, m.y, m.z, m.w);
-}
+CoverValue blockCover(BlockStart start, int voxel) { return cover[start.matter + voxel]; }
 TableValue tableIntegral(BlockStart start, int entry) {
   vec4 e = integral[entry];
   return TableValue(e.x, e.y, e.z, e.w);

@@ -13,7 +13,7 @@ struct BlockReader {
   const float* places;
   const float* attenuations;
   const LightValue* lights;
-  const TableEntry* matter;
+  const CoverValue* cover;
   const TableEntry* integral;
   const TableEntry* density;
 };
@@ -30,9 +30,8 @@ inline void blockLight(const BlockReader& block, int voxel, float& red, float& g
   green = float(light.green) * (1.0f / LightGrid::kUnit);
   blue = float(light.blue) * (1.0f / LightGrid::kUnit);
 }
-inline TableValue blockMatter(const BlockReader& block, int voxel) {
-  const TableEntry& m = block.matter[voxel];
-  return {m.red, m.green, m.blue, m.extinction};
+inline CoverValue blockCover(const BlockReader& block, int voxel) {
+  return block.cover[voxel];
 }
 inline TableValue tableIntegral(const BlockReader& block, int entry) {
   const TableEntry& e = block.integral[entry];
@@ -94,7 +93,7 @@ class CpuCellCanvas final : public CellCanvas {
     for (size_t i = 0; i < samples.attenuations.size(); ++i)
       prepared.attenuations[i] = float(samples.attenuations[i]) * (1.0f / AttenuationGrid::kUnit);
     prepared.reader = {prepared.places.data(), prepared.attenuations.data(), samples.lights.data(),
-                       samples.matter.data(),  frame.table->integral.data(), frame.table->density.data()};
+                       ready.cover.data(),  frame.table->integral.data(), frame.table->density.data()};
   }
 
   void drawBatch(const CellFrame& frame, CellCounts& counts) {
@@ -153,8 +152,8 @@ std::unique_ptr<CellCanvas> makeCpuCellCanvas(glm::ivec2 imageSize, size_t block
 }
 
 uint64_t cpuCanvasBytes(int edge) {
-  // Codes and attenuation, also as floats; matter; light.
-  return blockVoxels(edge) * (2 * sizeof(uint16_t) + 2 * sizeof(float) + sizeof(TableEntry) + sizeof(LightValue));
+  // Codes and attenuation, also as floats; matter, also as cover; light.
+  return blockVoxels(edge) * (2 * sizeof(uint16_t) + 2 * sizeof(float) + sizeof(TableEntry) + sizeof(shared::CoverValue) + sizeof(LightValue));
 }
 
 }  // namespace freevoxel

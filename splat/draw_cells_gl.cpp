@@ -200,7 +200,7 @@ class GlCellCanvas final : public CellCanvas {
     });
     put(kMatterBinding, bytes.matter, [&](size_t offset) {
       for (size_t i = 0; i < shown.size(); ++i)
-        slot.buffer.write(offset + matterStarts[i] * sizeof(TableEntry), bytesOf(shown[i]->samples.matter));
+        slot.buffer.write(offset + matterStarts[i] * sizeof(TableEntry), bytesOf(shown[i]->cover));
     });
     slot.buffer.write(at, bytesOf(bounds));
 

@@ -5,6 +5,7 @@
 
 #include "base/first_exception.h"
 #include "base/grid.h"
+#include "shaders/shared/exact_math.h"
 #include "volume/code_visibility.h"
 
 namespace freevoxel {
@@ -70,6 +71,24 @@ CellBounds visibleCells(std::span<const TableEntry> matter, int side) {
   return bounds;
 }
 
+/// What blocks of levels from 1 on are interpolated by.
+void coverOf(const VisibleBlock& block, std::span<const TableEntry> matter, std::vector<shared::CoverValue>& cover) {
+  const float length = shared::kCoverVoxels * float(1 << block.level);
+  cover.resize(matter.size());
+  for (size_t i = 0; i < matter.size(); ++i) {
+    const TableEntry& from = matter[i];
+    if (!(from.extinction > 0.0f)) {
+      cover[i] = {0.0f, 0.0f, 0.0f, 0.0f};
+      continue;
+    }
+    const float depth = from.extinction * length;
+    const float opacity = shared::absorbed(depth);
+    const float perExtinction = opacity / from.extinction;
+    cover[i] = {from.red * perExtinction, from.green * perExtinction, from.blue * perExtinction,
+                opacity > 0.5f ? -shared::transmitted(depth) : opacity};
+  }
+}
+
 }  // namespace
 
 bool shrinkToVisible(VisibleBlock& block, int edge, const BlockSamples& samples, const CodeVisibility& visibility) {
@@ -118,6 +137,7 @@ void readyBlocks(const CellFrame& frame, std::span<const VisibleBlock> blocks, s
         one.block.high = one.block.origin + edge;
         one.bounds = {glm::ivec2(0), frame.view->imageSize};
         one.drawn = true;
+        coverOf(one.block, one.samples.matter, one.cover);
         return;
       }
       if (!shrinkToVisible(one.block, edge, one.samples, *frame.visibility)) {
@@ -130,6 +150,7 @@ void readyBlocks(const CellFrame& frame, std::span<const VisibleBlock> blocks, s
       }
       one.bounds = pixelBounds(*frame.view, one.block);
       one.drawn = !one.bounds.empty();
+      if (one.drawn) coverOf(one.block, one.samples.matter, one.cover);
       if (!one.drawn) ++culled;
     });
   }

@@ -3,7 +3,7 @@
 // A block owns the part of the ray inside its box, so blocks of whatever levels tile every ray. That part is cut by the
 // planes of voxels across the ray's dominant axis (of coarser levels: by every 2^level-th of them), the pieces are
 // halved, the value is interpolated at the cuts and classified after that by integrals over it (coarser levels:
-// classified voxels are interpolated), and the pieces are composited front to back. What lies before the block comes in
+// classified voxels are interpolated, by opacity), and the pieces are composited front to back. What lies before the block comes in
 // by one factor: attenuation towards the eye, interpolated where the ray comes to the first visible piece of the block.
 // Up to there the block itself takes nothing, and there the voxels around are stored ones. Nothing here depends on
 // another block, so blocks add in any order.
@@ -11,7 +11,8 @@
 // The file that includes this one defines BLOCK_ACCESS, a parameter (with comma) that functions hand on as
 // BLOCK_HAND_ON, and these readers of the block at hand, which count voxels from the corner of its apron, origin - 1:
 //   float blockPlace(BLOCK_ACCESS int voxel), blockAttenuation(...), void blockLight(..., out r, out g, out b)
-//   TableValue blockMatter(BLOCK_ACCESS int voxel), tableIntegral(BLOCK_ACCESS int entry), tableDensity(...)
+//   TableValue tableIntegral(BLOCK_ACCESS int entry), tableDensity(...)
+//   CoverValue blockCover(BLOCK_ACCESS int voxel)
 #ifndef FREEVOXEL_SHADERS_SHARED_CELL_BLOCK_H
 #define FREEVOXEL_SHADERS_SHARED_CELL_BLOCK_H
 
@@ -193,37 +194,57 @@ SHARED_FUNCTION void rayLight(BLOCK_ACCESS PixelRay ray, CellLayout layout_, int
   blue = b;
 }
 
-// Classified matter at place k + t, of levels from 1 on.
-SHARED_FUNCTION TableValue rayMatter(BLOCK_ACCESS PixelRay ray, CellLayout layout_, int k, float t) {
+// A mixture of voxels of levels from 1 on: colour times opacity, opacity, and transmittance, which is 1 - opacity but
+// precise where that is small.
+struct CoverMix {
+  float red, green, blue, opacity, transmittance;
+};
+
+// At place k + t.
+SHARED_FUNCTION CoverMix rayCover(BLOCK_ACCESS PixelRay ray, CellLayout layout_, int k, float t) {
   CellStep step_ = cellStep(layout_, k, t);
   CellPlace at = cellPlace(ray, layout_, k, t, step_);
   EXACT float red = 0.0f;
   EXACT float green = 0.0f;
   EXACT float blue = 0.0f;
-  EXACT float extinction = 0.0f;
+  EXACT float opacity = 0.0f;
+  EXACT float transmittance = 0.0f;
   for (int i = 0; i < 8; ++i) {
     CellCorner corner = cellCorner(layout_, at, step_.t, i);
-    TableValue here = blockMatter(BLOCK_HAND_ON corner.voxel);
+    CoverValue here = blockCover(BLOCK_HAND_ON corner.voxel);
+    EXACT float covered = here.cover < 0.0f ? 1.0f + here.cover : here.cover;
+    EXACT float open = here.cover < 0.0f ? -here.cover : 1.0f - here.cover;
     red = red + corner.weight * here.red;
     green = green + corner.weight * here.green;
     blue = blue + corner.weight * here.blue;
-    extinction = extinction + corner.weight * here.extinction;
+    opacity = opacity + corner.weight * covered;
+    transmittance = transmittance + corner.weight * open;
   }
-  TableValue result;
+  CoverMix result;
   result.red = red;
   result.green = green;
   result.blue = blue;
-  result.extinction = extinction;
+  result.opacity = opacity;
+  result.transmittance = transmittance;
   return result;
 }
 
-// Mean between two places along which matter changes linearly.
-SHARED_FUNCTION TableValue matterMean(TableValue from, TableValue to) {
-  EXACT float red = 0.5f * (from.red + to.red);
-  EXACT float green = 0.5f * (from.green + to.green);
-  EXACT float blue = 0.5f * (from.blue + to.blue);
-  EXACT float extinction = 0.5f * (from.extinction + to.extinction);
+// What lies between two places along which opacity changes linearly: colour times extinction, extinction.
+SHARED_FUNCTION TableValue coverMean(CellLayout layout_, CoverMix from, CoverMix to) {
+  EXACT float opacity = 0.5f * (from.opacity + to.opacity);
   TableValue mean;
+  mean.red = 0.0f;
+  mean.green = 0.0f;
+  mean.blue = 0.0f;
+  mean.extinction = 0.0f;
+  if (!(opacity > kLeastExtinction)) return mean;
+  EXACT float transmittance = 0.5f * (from.transmittance + to.transmittance);
+  EXACT float depth = opacity <= 0.5f ? depthOfOpacity(opacity) : depthOfTransmittance(min(transmittance, 0.5f));
+  EXACT float extinction = depth * layout_.perVoxel * (1.0f / kCoverVoxels);
+  EXACT float perOpacity = 0.5f * extinction * reciprocal(opacity);
+  EXACT float red = perOpacity * (from.red + to.red);
+  EXACT float green = perOpacity * (from.green + to.green);
+  EXACT float blue = perOpacity * (from.blue + to.blue);
   mean.red = red;
   mean.green = green;
   mean.blue = blue;
@@ -318,12 +339,13 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay finestRay, CellLayout l
     int end = int(to + 1.0f);          // rounded up
     if (float(end - 1) >= to) end = end - 1;
     bool haveBefore = false;
-    EXACT float before = 0.0f;  // value, or matter, at the end of the piece just done
-    TableValue matterBefore;
-    matterBefore.red = 0.0f;
-    matterBefore.green = 0.0f;
-    matterBefore.blue = 0.0f;
-    matterBefore.extinction = 0.0f;
+    EXACT float before = 0.0f;  // value, or cover, at the end of the piece just done
+    CoverMix coverBefore;
+    coverBefore.red = 0.0f;
+    coverBefore.green = 0.0f;
+    coverBefore.blue = 0.0f;
+    coverBefore.opacity = 0.0f;
+    coverBefore.transmittance = 1.0f;
     for (int i = 0; i < end - first; ++i) {
       int k = eyeAbove ? end - 1 - i : first + i;
       EXACT float low = max(from - float(k), 0.0f);
@@ -341,12 +363,12 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay finestRay, CellLayout l
       ++traced;
       TableValue halves[2];
       if (classified) {
-        TableValue matterNear = matterBefore;
-        if (!haveBefore) matterNear = rayMatter(BLOCK_HAND_ON ray, layout_, k, nearEnd);
-        TableValue matterMiddle = rayMatter(BLOCK_HAND_ON ray, layout_, k, middle);
-        matterBefore = rayMatter(BLOCK_HAND_ON ray, layout_, k, farEnd);
-        halves[0] = matterMean(matterNear, matterMiddle);
-        halves[1] = matterMean(matterMiddle, matterBefore);
+        CoverMix coverNear = coverBefore;
+        if (!haveBefore) coverNear = rayCover(BLOCK_HAND_ON ray, layout_, k, nearEnd);
+        CoverMix coverMiddle = rayCover(BLOCK_HAND_ON ray, layout_, k, middle);
+        coverBefore = rayCover(BLOCK_HAND_ON ray, layout_, k, farEnd);
+        halves[0] = coverMean(layout_, coverNear, coverMiddle);
+        halves[1] = coverMean(layout_, coverMiddle, coverBefore);
       } else {
         EXACT float valueNear = before;
         if (!haveBefore) valueNear = rayPlace(BLOCK_HAND_ON ray, layout_, k, nearEnd);

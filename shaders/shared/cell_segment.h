@@ -37,6 +37,16 @@ struct TableValue {
   float red, green, blue, extinction;
 };
 
+// A voxel of levels from 1 on, as blocks hold it: colour times opacity, and opacity over kCoverVoxels shortest edges of
+// the level. Above one half, `cover` is minus what is let through, which then is the more precise.
+struct CoverValue {
+  float red, green, blue, cover;
+};
+
+// Opacity over so many voxels is what is interpolated between voxels of coarser levels. Interpolated extinction would let
+// opaque matter swell: a tenth of what is opaque is opaque still (docs/fidelity.md).
+SHARED_CONSTANT float kCoverVoxels = 4.0f;
+
 // A block as rays along one dominant axis a see it, with b and c as in PixelRay. Places count voxels of the block's
 // level from the corner that is voxel (0,0,0) of the finest one, so that a place is 2^-level times that of the finest
 // level: voxel n of a level lies at place n + offset.

@@ -14,7 +14,8 @@
 #include "base/error.h"
 #include "hierarchy/attenuation_file.h"
 #include "precompute/checksums.h"
-#include "precompute/level_builder.h"
+#include "precompute/finest_matter.h"
+#include "precompute/level_matter.h"
 #include "precompute/precompute.h"
 #include "precompute/stored_bricks.h"
 #include "tests/precompute/test_volumes.h"
@@ -53,15 +54,47 @@ TEST(ReducedMatter, OneOpaqueVoxelHidesAQuarter) {
   EXPECT_NEAR(std::exp(-2.0f * reduced({50.0f, 0, 0, 0, 0, 0, 0, 0}).extinction), 0.75f, 1e-6f);
 }
 
-TEST(ReducedMatter, ColoursCountByExtinction) {
+TEST(ReducedMatter, ColoursCountByOpacity) {
   const LevelMatter red{{0.9f, 0.0f, 0.0f}, 0.9f}, blue{{0.0f, 0.0f, 0.1f}, 0.1f};
-  const LevelMatter result = reducedMatter({&red, &blue, &red, &blue, &red, &blue, &red, &blue}, glm::vec3(1.0f));
-  EXPECT_NEAR(result.glow.r / result.extinction, 0.9f, 1e-6f);
-  EXPECT_NEAR(result.glow.b / result.extinction, 0.1f, 1e-6f);
+  const LevelMatter result = reducedMatter({&red, &blue, &red, &blue, &red, &blue, &red, &blue}, glm::vec3(2, 1, 3));
+  const float ofRed = -std::expm1(-1.8f), ofBlue = -std::expm1(-0.2f);  // over two of the shortest edges
+  EXPECT_NEAR(result.glow.r / result.extinction, ofRed / (ofRed + ofBlue), 1e-6f);
+  EXPECT_NEAR(result.glow.b / result.extinction, ofBlue / (ofRed + ofBlue), 1e-6f);
   const LevelMatter nothing;
   EXPECT_EQ(reducedMatter({&nothing, &nothing, nullptr, nullptr, nullptr, nullptr, nullptr, nullptr}, glm::vec3(1.0f))
                 .extinction,
             0.0f);
+}
+
+/// A sheet that only interpolation shows: between 0 and 200 there is 100, and nothing else is visible.
+TEST(FinestMatter, HoldsWhatLiesBetweenVoxels) {
+  TransferFunction transfer;
+  transfer.points = {{80.0, glm::dvec3(1.0), 0.0},
+                     {100.0, glm::dvec3(1.0), 0.5},
+                     {120.0, glm::dvec3(1.0), 0.0},
+                     {255.0, glm::dvec3(1.0), 0.0}};
+  const ValueCoding coding = valueCoding(ValueType::u8, 0.0, 255.0);
+  FinestMatter::Codes codes;
+  for (size_t i = 0; i < codes.size(); ++i)
+    codes[i] = i % 4 < 2 ? 0 : 200;
+  std::array<LevelMatter, 8> matter;
+  const FinestMatter finest(transfer, coding);
+  // A quarter of the way is 50 and 150: nothing.
+  ASSERT_TRUE(finest.ofEight(codes, matter));
+  EXPECT_EQ(matter[0].extinction, 0.0f);
+  // 100 lies a quarter of the way from 66 to 202, and on one side only.
+  for (size_t i = 0; i < codes.size(); ++i)
+    codes[i] = i % 4 < 2 ? 66 : 202;
+  ASSERT_TRUE(finest.ofEight(codes, matter));
+  EXPECT_NEAR(matter[0].extinction, 0.5f * float(transfer.extinctionAt(100.0)), 1e-6f);
+  EXPECT_EQ(matter[1].extinction, 0.0f);
+  // Labels are not interpolated.
+  transfer.isLabels = true;
+  transfer.points = {{0.0, glm::dvec3(1.0), 0.0}, {66.0, glm::dvec3(1.0), 0.25}};
+  const FinestMatter ofLabels(transfer, coding);
+  ASSERT_TRUE(ofLabels.ofEight(codes, matter));
+  EXPECT_NEAR(matter[0].extinction, -std::log(0.75f), 1e-6f);
+  EXPECT_EQ(matter[1].extinction, 0.0f);
 }
 
 struct Tested {
@@ -77,6 +110,30 @@ INSTANTIATE_TEST_SUITE_P(Kinds, LevelFile,
                            return std::string(layoutName(tested.param.layout)) + "_" +
                                   std::string(hierarchyName(tested.param.hierarchy));
                          });
+
+glm::ivec3 gridPosition(uint64_t i, glm::ivec3 dims) {
+  return {int(i % uint64_t(dims.x)), int(i / uint64_t(dims.x) % uint64_t(dims.y)),
+          int(i / (uint64_t(dims.x) * uint64_t(dims.y)))};
+}
+
+/// What the box of a voxel holds on average, by eight places inside of it.
+LevelMatter meanOfBox(const std::vector<uint16_t>& codes, glm::ivec3 dims, glm::ivec3 p,
+                      const TransferFunction& transfer, const ValueCoding& coding) {
+  LevelMatter mean;
+  for (int place = 0; place < 8; ++place) {
+    const glm::ivec3 side = 2 * glm::ivec3(place & 1, place >> 1 & 1, place >> 2) - 1;
+    double code = 0.0;
+    for (int corner = 0; corner < 8; ++corner) {
+      const glm::ivec3 away(corner & 1, corner >> 1 & 1, corner >> 2);
+      const glm::ivec3 q = glm::clamp(p + side * away, glm::ivec3(0), dims - 1);
+      code += codes[linearIndex(q, dims)] * (away.x ? 0.25 : 0.75) * (away.y ? 0.25 : 0.75) * (away.z ? 0.25 : 0.75);
+    }
+    const Classified at = transfer.at(coding.decode(code));
+    mean.glow += 0.125f * at.linear * at.extinction;
+    mean.extinction += 0.125f * at.extinction;
+  }
+  return mean;
+}
 
 PrecomputeOptions optionsOf(const Tested& tested, int edge) {
   PrecomputeOptions options;
@@ -110,10 +167,8 @@ TEST_P(LevelFile, StandsForTheFinestLevel) {
   const bool geometric = GetParam().hierarchy == Hierarchy::geometric;
   glm::ivec3 finer = dims;
   std::vector<LevelMatter> matter;
-  for (const uint16_t code : codes) {
-    const Classified at = transfer.at(file.coding().decode(code));
-    matter.push_back({at.linear * at.extinction, at.extinction});
-  }
+  for (uint64_t i = 0; i < codes.size(); ++i)
+    matter.push_back(meanOfBox(codes, dims, gridPosition(i, dims), transfer, file.coding()));
   std::vector<std::vector<double>> means;  // of each direction: depth (geometric) or attenuation (weighted)
   for (const auto& plane : planes) {
     means.emplace_back();
@@ -135,7 +190,10 @@ TEST_P(LevelFile, StandsForTheFinestLevel) {
         if (glm::any(glm::greaterThanEqual(q, finer))) continue;
         const uint64_t at = linearIndex(q, finer);
         children[child] = &matter[at];
-        const double weight = -std::expm1(-double(matter[at].extinction) * (1 << (level - 1)));
+        // The sweep knows a voxel of the finest level by its code alone.
+        const double extinction =
+            level == 1 ? transfer.extinctionAt(file.coding().decode(codes[at])) : double(matter[at].extinction);
+        const double weight = -std::expm1(-extinction * (1 << (level - 1)));
         weights += weight;
         count += 1.0;
         for (size_t k = 0; k < means.size(); ++k) {
