@@ -33,7 +33,7 @@ constexpr int kMostFrames = 9999;
 enum class PictureFormula { paper, direct, normalised, blended, raycast };
 
 struct RenderOptions {
-  std::string input, sums, transfer;
+  std::string input, sums, transfer, progressive;
   PictureOptions picture;
   VolumeOptions raw;
   CameraOptions camera;
@@ -96,6 +96,17 @@ void checkOptions(const RenderOptions& options, const CLI::App& command) {
   onlyWith(options.formula == PictureFormula::raycast, {"--raycast", "--step", "--shadow-step"}, "raycast");
   onlyWith(options.formula == PictureFormula::blended, {"--blend-kernel"}, "blended");
   onlyWith(hasSums(options.formula), {"--partition", "--composite", "--colour-by"}, "normalised, direct or paper");
+  if (given("--progressive")) {
+    onlyWith(hasSums(options.formula), {"--progressive"}, "normalised, direct or paper");
+    for (const char* name : {"--frames", "--memory", "--colour-by"}) {
+      if (given(name))
+        throw UsageError(fmt::format("--progressive makes one picture better and better: leave {} out", name));
+    }
+    if (!isAttenuationFile(options.input)) {
+      throw UsageError(
+          "--progressive needs an attenuation file with levels: freevoxel precompute VOLUME --levels 0 -o FILE.fvx");
+    }
+  }
   checkOutputName(options.picture);
   if (!options.sums.empty() && lowerCaseExtension(options.sums) != "exr") {
     throw UsageError(fmt::format("--sums: expected a name ending in .exr, found '{}'", options.sums));
@@ -203,6 +214,33 @@ void drawRays(const ValueGrid& grid, const TransferFunction& transfer, const Ren
   });
 }
 
+/// The picture, and those before it in a folder of their own.
+void drawProgressively(Splatter& splatter, const Box& bounds, const AttenuationFile& file, const RenderOptions& options,
+                       Session& session) {
+  std::error_code problem;
+  std::filesystem::create_directories(options.progressive, problem);
+  if (problem) throw MachineError(fmt::format("{}: cannot be made: {}", options.progressive, problem.message()));
+  const Formula formula = splatFormula(options.formula);
+  drawFrames(options, bounds, session, [&](const Camera& camera, std::optional<Sums>& sums) {
+    size_t pictures = 0;
+    const auto show = [&](size_t n, const Sums& shown) {
+      PictureOptions output = options.picture;
+      output.output = (std::filesystem::path(options.progressive) /
+                       fmt::format("{:02}{}", n, std::filesystem::path(options.picture.output).extension().string()))
+                          .string();
+      writePicture(output, resolve(shown, formula), session);
+      pictures = n + 1;
+    };
+    SplatResult result = splatter.refine(camera, options.splat, show, session.progress());
+    report(result.statistics, file.dims(), &file, session);
+    session.statistics["passes"] = result.statistics.passes;
+    session.statistics["quantum"] = result.sums.quantum;
+    session.statistics["pictures"] = pictures;
+    sums = std::move(result.sums);
+    return resolve(*sums, formula);
+  });
+}
+
 /// Either may be null: without `file` attenuation is swept, without `grid` values are read as they are needed.
 void drawSplats(const ValueGrid* grid, const AttenuationFile* file, TransferFunction transfer, RenderOptions options,
                 Session& session) {
@@ -228,6 +266,7 @@ void drawSplats(const ValueGrid* grid, const AttenuationFile* file, TransferFunc
     });
     return;
   }
+  if (!options.progressive.empty()) return drawProgressively(splatter, bounds, *file, options, session);
   SharedDrawing drawing(splatter, options.share, options.camera.imageSize, session);
   drawFrames(options, bounds, session, [&](const Camera& camera, std::optional<Sums>& sums) {
     SplatResult result = drawing.render(camera, options.splat);
@@ -302,6 +341,9 @@ Outcome render(RenderOptions options, const CLI::App& command, Session& session)
   options.splat.lighting = options.raycast.lighting = makeLighting(options.light);
   if (options.formula == PictureFormula::paper && command.get_option("--footprint")->count() == 0) {
     options.splat.footprint = Footprint::kernel;
+  }
+  if (session.ranks().rankCount() > 1 && !options.progressive.empty()) {
+    throw UsageError("--progressive is for one process: leave the launcher out");
   }
   if (session.ranks().rankCount() > 1 && !hasSums(options.formula)) {
     throw UsageError("only sums are shared among processes: run --formula raycast and blended without the launcher");
@@ -392,6 +434,12 @@ Command addRender(CLI::App& program, CommonOptions& common) {
                  fmt::format("a turntable: N pictures, 1 to {}, of a full turn about y, named NAME_0000.png and so on",
                              kMostFrames),
                  [](std::string_view text) { return int(parseWhole(text, 1, kMostFrames)); });
+  command
+      ->add_option(
+          "--progressive", options->progressive,
+          "of an attenuation file with levels: also write the pictures that become this one, 00.png and so on, "
+          "from the coarsest level on; blocks are taken back and finer ones added, exactly")
+      ->type_name("FOLDER");
   addBackgroundOption(*command, options->picture);
   addCameraOptions(*command, options->camera);
   addLightOptions(*command, options->light);

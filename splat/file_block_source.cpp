@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <glm/glm.hpp>
-#include <glm/gtc/packing.hpp>
 #include <utility>
 
 #include "base/error.h"
@@ -27,6 +26,11 @@ glm::ivec3 atIndex(size_t i, int edge) {
 
 /// Extinction that a surface's colour fully counts from, in log2 per shortest edge: an opacity of a half.
 constexpr float kOpaqueExtinction = 1.0f;
+
+/// Of a binary16 that is not negative and finite; exact.
+float fromHalf(uint16_t bits) {
+  return std::bit_cast<float>(uint32_t(bits) << 13) * 0x1p112f;
+}
 
 }  // namespace
 
@@ -223,7 +227,7 @@ void FileBlockSource::readValues(const Place& place, Brick& brick) const {
   const BrickView view = file_.levelBrick(place.level, *stored, DirectionSet(0));
   for (size_t i = 0; i < brick.matter.size(); ++i) {
     const size_t step = view.steps[i];
-    const float extinction = glm::unpackHalf1x16(view.matter[3][step]);
+    const float extinction = fromHalf(view.matter[3][step]);
     if (view_.white) {
       brick.matter[i] = {extinction, extinction, extinction, extinction};
       continue;

@@ -18,9 +18,11 @@
 #include "splat/grid_block_source.h"
 #include "splat/kernel_splats.h"
 #include "splat/level_selection.h"
+#include "splat/levelled_block_source.h"
 #include "splat/near_field.h"
 #include "splat/pinned_attenuation.h"
 #include "splat/pixel_rays.h"
+#include "splat/refinement.h"
 
 namespace freevoxel {
 
@@ -118,6 +120,7 @@ struct Splatter::State {
     Camera camera;
     SplatOptions options;
     VolumeView view;
+    bool allLevels = false;
     std::vector<VisibleBlock> blocks;
     size_t blocksAtATime = 64;
     // What the source looks at.
@@ -328,7 +331,7 @@ void Splatter::State::shareMemory(Frame& to, uint64_t fixedBytes, uint64_t bytes
 }
 
 void Splatter::State::lookIntoGrids(Frame& to, const Towards& eye, AttenuationSource source) {
-  if (to.options.lodPixels > 0.0) {
+  if (to.options.lodPixels > 0.0 || (to.allLevels && source != AttenuationSource::stored)) {
     throw InputError(
         "swept and pinned attenuation know the finest level only; leave --lod out, or take --attenuation stored or "
         "interpolated");
@@ -359,7 +362,8 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
   FileBlockSource::View look;
   look.white = std::all_of(transfer.points.begin(), transfer.points.end(),
                            [](const TransferPoint& point) { return point.srgb == glm::dvec3(1.0); });
-  if (options.lodPixels > 0.0 && file->levels() > 1 && !look.white && !sameColours(transfer, file->transfer())) {
+  if ((options.lodPixels > 0.0 || to.allLevels) && file->levels() > 1 && !look.white &&
+      !sameColours(transfer, file->transfer())) {
     throw InputError(fmt::format(
         "{}: levels hold colours, those of its own transfer function; leave --lod out, or run precompute again",
         file->path()));
@@ -414,12 +418,17 @@ std::span<const VisibleBlock> Splatter::blocks() const {
 }
 
 void Splatter::prepare(const Camera& camera, const SplatOptions& options) {
+  prepareFrame(camera, options, false);
+}
+
+void Splatter::prepareFrame(const Camera& camera, const SplatOptions& options, bool allLevels) {
   State& state = *state_;
   state.frame.reset();
   ++state.frameNumber;
   auto frame = std::make_unique<State::Frame>();
   frame->camera = camera;
   frame->options = options;
+  frame->allLevels = allLevels;
   frame->view = volumeView(state.placement, camera);
   SplatStatistics& statistics = frame->statistics;
   statistics.passes = 0;
@@ -443,7 +452,13 @@ void Splatter::prepare(const Camera& camera, const SplatOptions& options) {
   const bool nearField = source == AttenuationSource::stored && options.footprint == Footprint::cell;
   if (source == AttenuationSource::swept || source == AttenuationSource::pinned ||
       (nearField && options.lodPixels == 0.0)) {
+    std::unique_ptr<BlockSource> coarser;
+    if (allLevels && nearField) {
+      state.lookIntoFile(*frame, eye, source);
+      coarser = std::move(frame->source);
+    }
     state.lookIntoGrids(*frame, eye, source);
+    if (coarser) frame->source = std::make_unique<LevelledBlockSource>(std::move(frame->source), std::move(coarser));
   } else {
     state.lookIntoFile(*frame, eye, source);
   }
@@ -535,6 +550,52 @@ SplatResult Splatter::render(const Camera& camera, const SplatOptions& options, 
     if (sumsAreExact(sums)) return {std::move(sums), statistics()};
     quantum = nextQuantum(quantum);
   }
+}
+
+SplatResult Splatter::refine(const Camera& camera, const SplatOptions& options,
+                             const std::function<void(size_t n, const Sums& sums)>& show, Progress& progress) {
+  State& state = *state_;
+  if (state.file == nullptr || state.file->levels() < 2) {
+    throw InputError(fmt::format("{}: has no coarser levels; make it with freevoxel precompute --levels 0",
+                                 state.file != nullptr ? state.file->path() : "a volume without an attenuation file"));
+  }
+  prepareFrame(camera, options, true);
+  state.findLevels();
+  State::Frame& frame = *state.frame;
+  const Refinement refinement = refinementTo(frame.blocks, state.levels, state.blockEdge, frame.view);
+  progress.begin("refining", refinement.steps.size() + 1, "pictures");
+  const auto shown = [&](size_t n, const Sums& sums) {
+    if (!sumsAreExact(sums)) return false;
+    show(n, sums);
+    progress.advance(1);
+    return true;
+  };
+  Sums sums;
+  float quantum = options.firstQuantum;
+  for (bool exact = false; !exact; quantum = exact ? quantum : nextQuantum(quantum)) {
+    ++frame.statistics.passes;
+    sums = drawFrameBlocks(refinement.first, quantum, silentProgress());
+    exact = shown(0, sums);
+    for (size_t n = 0; n < refinement.steps.size() && exact; ++n) {
+      const Sums removed = drawFrameBlocks(refinement.steps[n].removed, quantum, silentProgress());
+      const Sums added = drawFrameBlocks(refinement.steps[n].added, quantum, silentProgress());
+      // What is removed is part of the sum, and nothing is negative: the difference is exact if the sum was, and the
+      // new sum proves itself.
+      for (size_t i = 0; i < sums.image.pixels.size(); ++i)
+        sums.image.pixels[i] = sums.image.pixels[i] - removed.image.pixels[i] + added.image.pixels[i];
+      exact = shown(n + 1, sums);
+    }
+  }
+  // Where a coarse picture needed a larger quantum, the fine one by itself need not.
+  for (float finer = options.firstQuantum; finer < quantum; finer = nextQuantum(finer)) {
+    Sums direct = drawFrameBlocks(frame.blocks, finer, silentProgress());
+    if (!shown(refinement.steps.size(), direct)) continue;
+    sums = std::move(direct);
+    break;
+  }
+  progress.end();
+  frame.statistics.volumeBytes = frame.source->volumeBytes();
+  return {std::move(sums), frame.statistics};
 }
 
 BlendedResult Splatter::renderBlended(const Camera& camera, BlendKernel kernel, const SplatOptions& options,

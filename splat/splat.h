@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -153,6 +154,13 @@ class Splatter {
   /// Of the frame as it was drawn last.
   const SplatStatistics& statistics() const;
 
+  /// The same, from coarse to fine: `show(n, sums)` gets the coarsest level's sums, n = 0, and then those after each
+  /// step in which blocks are subtracted and their finer ones added, exactly; the last are those that render() gives,
+  /// bit for bit. If sums turn out not to be exact, all begins again, with n = 0. Statistics count what was drawn in
+  /// all. Throws InputError if there are no levels, or if attenuation is swept or pinned.
+  SplatResult refine(const Camera& camera, const SplatOptions& options,
+                     const std::function<void(size_t n, const Sums& sums)>& show, Progress& progress);
+
   /// The leaky baseline: kernels, sorted by their distance from the eye and laid over each other from back to front.
   /// On the CPU only. `options` as for `render`; formula, footprint and source of attenuation do not matter.
   BlendedResult renderBlended(const Camera& camera, BlendKernel kernel, const SplatOptions& options,
@@ -160,6 +168,8 @@ class Splatter {
 
  private:
   struct State;
+  /// `allLevels`: blocks of every level can be drawn, not only those of the frame.
+  void prepareFrame(const Camera& camera, const SplatOptions& options, bool allLevels);
   Sums drawFrameBlocks(std::span<const VisibleBlock> blocks, float quantum, Progress& progress);
 
   std::unique_ptr<State> state_;

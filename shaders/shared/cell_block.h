@@ -3,10 +3,10 @@
 // A block owns the part of the ray inside its box, so blocks of whatever levels tile every ray. That part is cut by the
 // planes of voxels across the ray's dominant axis (of coarser levels: by every 2^level-th of them), the pieces are
 // halved, the value is interpolated at the cuts and classified after that by integrals over it (coarser levels:
-// classified voxels are interpolated, by opacity), and the pieces are composited front to back. What lies before the block comes in
-// by one factor: attenuation towards the eye, interpolated where the ray comes to the first visible piece of the block.
-// Up to there the block itself takes nothing, and there the voxels around are stored ones. Nothing here depends on
-// another block, so blocks add in any order.
+// classified voxels are interpolated, by opacity), and the pieces are composited front to back. What lies before the
+// block comes in by one factor: attenuation towards the eye, interpolated where the ray comes to the first visible
+// piece of the block. Up to there the block itself takes nothing, and there the voxels around are stored ones. Nothing
+// here depends on another block, so blocks add in any order.
 //
 // The file that includes this one defines BLOCK_ACCESS, a parameter (with comma) that functions hand on as
 // BLOCK_HAND_ON, and these readers of the block at hand, which count voxels from the corner of its apron, origin - 1:

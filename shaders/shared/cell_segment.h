@@ -43,8 +43,8 @@ struct CoverValue {
   float red, green, blue, cover;
 };
 
-// Opacity over so many voxels is what is interpolated between voxels of coarser levels. Interpolated extinction would let
-// opaque matter swell: a tenth of what is opaque is opaque still (docs/fidelity.md).
+// Opacity over so many voxels is what is interpolated between voxels of coarser levels. Interpolated extinction would
+// let opaque matter swell: a tenth of what is opaque is opaque still (docs/fidelity.md).
 SHARED_CONSTANT float kCoverVoxels = 4.0f;
 
 // A block as rays along one dominant axis a see it, with b and c as in PixelRay. Places count voxels of the block's

@@ -1,7 +1,10 @@
 // The whole line through the real program, on a small volume that is no cube.
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <cmath>
+#include <filesystem>
 
 #include "base/compare.h"
 #include "base/image.h"
@@ -282,6 +285,30 @@ TEST_F(Pipeline, quietSaysNothing) {
   const ProcessResult result = run(std::string("render cloud.nrrd --transfer t.json --quiet -o a.png") + kView);
   EXPECT_EQ(result.output, "");
   EXPECT_EQ(result.talk, "");
+}
+
+TEST_F(Pipeline, progressivePicturesEndInTheDirectOne) {
+  run("generate cloud --dims 100,40,130 --seed 3 -o large.nrrd");
+  run("precompute large.nrrd --transfer t.json --levels 0 --brick 8 -o large.fvx");
+  run("render large.fvx --size 61x43 -o direct.exr --sums direct.sums.exr");
+  run("render large.fvx --size 61x43 -o last.exr --sums last.sums.exr --progressive steps --stats steps.json");
+  expectIdentical("last.exr", "direct.exr");
+  expectIdentical("last.sums.exr", "direct.sums.exr");
+  const auto stats = nlohmann::json::parse(readBytes(folder + "/steps.json"));
+  const int pictures = stats["pictures"];
+  EXPECT_GE(pictures, 9);
+  expectIdentical(fmt::format("steps/{:02}.exr", pictures - 1), "direct.exr");
+  EXPECT_LT(compareImages(readImage(folder + "/steps/00.exr"), readImage(folder + "/direct.exr")).psnr, 40.0);
+  EXPECT_FALSE(std::filesystem::exists(folder + fmt::format("/steps/{:02}.exr", pictures)));
+  // What has no levels, or no sums to take back, is told so.
+  const auto refused = [](const std::string& call, int status, const std::string& expected) {
+    expectRefusal(folder, words(call + " -o x.png --progressive refused"), status, expected);
+  };
+  refused("render cloud.fvx", kFailed, "--levels 0");
+  refused("render cloud.nrrd --transfer t.json", kUsage, "--progressive needs an attenuation file");
+  refused("render large.fvx --frames 3", kUsage, "leave --frames out");
+  refused("render large.fvx --formula raycast", kUsage, "--progressive needs --formula");
+  refused("render large.fvx --attenuation swept", kFailed, "finest level only");
 }
 
 }  // namespace

@@ -110,6 +110,58 @@ TEST(Levels, CutTilesTheVolumeAndIsFinerNearTheEye) {
   EXPECT_EQ(std::count(owners.begin(), owners.end(), 1), int64_t(owners.size()));
 }
 
+// Coarse sums are taken back exactly: what is left at the end are the bits of the direct picture. Blocks of 16, since
+// there are to be many.
+TEST(Levels, RefinementEndsInTheBitsOfTheDirectPicture) {
+  // Its waves are longer than voxels of the coarsest level, of which finer levels could not be sure to be nearer.
+  const Scene scene =
+      makeScene(makeVolume({45, 37, 100}, {1.0, 0.7, 1.1},
+                           [](int x, int y, int z) {
+                             return int(127.5 + 90.0 * std::sin(0.11 * x + 0.05 * z) * std::cos(0.1 * y) +
+                                        37.0 * std::cos(0.09 * z));
+                           }),
+                lumps().transfer, 8, Classification::preintegrated);
+  const Camera camera = randomViews(scene.bounds(), 1, {83, 61})[0];
+  SplatOptions cell, kernel = kKernel, interpolated, coarse, lit;
+  interpolated.attenuation = AttenuationSource::interpolated;
+  coarse.lodPixels = 1.2;
+  lit.lighting.lights = {{true, {0.3, 1.0, 0.2}, {1.0f, 0.8f, 0.5f}}};
+  lit.lighting.ambient = 0.2f;
+  for (const SplatOptions& options : {cell, kernel, interpolated, coarse, lit}) {
+    Splatter splatter(*scene.file, scene.transfer, Backend::cpu, 16);
+    std::vector<Image> pictures;
+    const SplatResult refined = splatter.refine(
+        camera, options,
+        [&](size_t n, const Sums& sums) {
+          ASSERT_EQ(n, pictures.size());
+          pictures.push_back(resolve(sums, Formula::normalised));
+        },
+        silentProgress());
+    ASSERT_GE(pictures.size(), options.lodPixels > 0.0 ? 2u : 9u);
+    EXPECT_TRUE(sameSums(refined, splatter.render(camera, options, silentProgress())));
+    double before = 0.0;
+    for (size_t n = 0; n + 1 < pictures.size(); ++n) {
+      const double now = compareImages(pictures[n], pictures.back()).psnr;
+      EXPECT_GE(now, before - 0.05) << n;
+      before = now;
+    }
+    EXPECT_GT(before, compareImages(pictures[0], pictures.back()).psnr + 1.0);
+  }
+}
+
+TEST(Levels, RefinementNeedsLevelsAndWhatIsKnownOfThem) {
+  const Scene scene = lumps();
+  const auto refuse = [](size_t, const Sums&) { FAIL(); };
+  const ValueGrid grid = scene.grid();
+  const Camera camera = alongView(scene, {8, 8});
+  Splatter withoutFile(grid, nullptr, scene.transfer, Backend::cpu, 16);
+  EXPECT_THROW(withoutFile.refine(camera, {}, refuse, silentProgress()), InputError);
+  Splatter splatter(*scene.file, scene.transfer, Backend::cpu, 16);
+  SplatOptions swept;
+  swept.attenuation = AttenuationSource::swept;
+  EXPECT_THROW(splatter.refine(camera, swept, refuse, silentProgress()), InputError);
+}
+
 // Kernels keep their mass whatever their level.
 TEST(Levels, KernelsOfAMixedCutHaveTheDepthOfTheFinest) {
   const Scene scene = uniformBox();
