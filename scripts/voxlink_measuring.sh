@@ -12,7 +12,7 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
 value() { # KEY of the last statistics
-  sed -n "s/^ *\"$1\": \"\{0,1\}\([^\",]*[^\",]\).*/\1/p" "$scratch/stats.json" | head -n 1
+  sed -n "s/^ *\"$1\": \"\(.*\)\",\{0,1\}$/\1/p; s/^ *\"$1\": \([^\",]*\),\{0,1\}$/\1/p" "$scratch/stats.json" | head -n 1
 }
 frames() { # seconds of every frame, one a line
   sed -n '/"frameSeconds"/,/\]/s/^ *\([0-9][0-9.e-]*\),\{0,1\}$/\1/p' "$scratch/stats.json"
