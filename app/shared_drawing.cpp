@@ -1,7 +1,6 @@
 #include "app/shared_drawing.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -35,12 +34,6 @@ glm::vec3 linearColour(int number) {
   for (int c = 0; c < 3; ++c)
     linear[c] = linearFromSrgb(float(rankColour(number)[c]));
   return linear;
-}
-
-std::string hostName() {
-  std::array<char, 256> name{};
-  gethostname(name.data(), name.size() - 1);
-  return name.data();
 }
 
 }  // namespace

@@ -10,11 +10,14 @@
 #include "app/light_options.h"
 #include "app/picture_output.h"
 #include "app/scene_file.h"
+#include "app/shared_drawing.h"
 #include "app/traced_scene.h"
 #include "base/error.h"
 #include "gl/context.h"
 #include "hierarchy/attenuation_file.h"
 #include "hierarchy/value_grid.h"
+#include "parallel/gather_rows.h"
+#include "precompute/checksums.h"
 #include "splat/splat.h"
 #include "volume/read_volume.h"
 #include "volume/resample.h"
@@ -100,6 +103,47 @@ std::unique_ptr<gl::Context> chooseContext(Backend backend) {
   return context;
 }
 
+uint64_t hashOf(const TracedScene& scene) {
+  std::vector<uint64_t> parts = {contentHash(std::as_bytes(std::span(scene.mesh.positions))),
+                                 contentHash(std::as_bytes(std::span(scene.mesh.triangles))),
+                                 contentHash(std::as_bytes(std::span(scene.spheres.centres))),
+                                 contentHash(std::as_bytes(std::span(scene.spheres.radii)))};
+  for (const SceneVolume& volume : scene.volumes)
+    parts.push_back(contentHash(std::as_bytes(std::span(volume.grid.codes))));
+  return contentHash(std::as_bytes(std::span(std::as_const(parts))));
+}
+
+/// A picture, every rank's band of rows traced by itself. Of no use on ranks other than 0.
+template <class Tracer>
+Image traceTogether(Tracer& voxlink, const Camera& camera, Session& session) {
+  const Ranks& ranks = session.ranks();
+  const ImageRows rows = bandOfRows(camera, ranks.rank(), ranks.rankCount());
+  return gatherRows(ranks, voxlink.trace(camera, rows, session.progress()));
+}
+
+/// Who traced what: rows, seconds, and rays of which the sum is the picture's.
+template <class Statistics>
+void reportRanks(const Statistics& done, const Camera& camera, Session& session) {
+  const Ranks& ranks = session.ranks();
+  if (ranks.rankCount() == 1) return;
+  const ImageRows rows = bandOfRows(camera, ranks.rank(), ranks.rankCount());
+  nlohmann::ordered_json mine = {{"rank", ranks.rank()},
+                                 {"host", hostName()},
+                                 {"seconds", {{"build", done.buildSeconds}, {"trace", done.traceSeconds}}},
+                                 {"firstRow", rows.first},
+                                 {"rows", rows.count}};
+  if constexpr (requires { done.rays; }) mine["rays"] = done.rays;
+  ranks.agree();
+  nlohmann::ordered_json all = nlohmann::ordered_json::array();
+  uint64_t rays = 0;
+  for (const std::string& text : ranks.gatherEverywhere(mine.dump())) {
+    all.push_back(nlohmann::ordered_json::parse(text));
+    rays += all.back().value("rays", uint64_t(0));
+  }
+  if (mine.contains("rays")) session.statistics["rays"] = rays;
+  session.statistics["ranks"] = std::move(all);
+}
+
 /// The paper's measurement: a full turn about y, then one about x. `drawFrame` is called with each view's camera.
 template <class DrawFrame>
 void measureTurns(const Camera& camera, int views, Session& session, const DrawFrame& drawFrame) {
@@ -158,6 +202,7 @@ void reportStatistics(const SceneVoxLinkStatistics& done, Session& session) {
 Outcome traceObjects(const TraceOptions& options, const SceneObjects& objects, Session& session) {
   if (!options.edit.empty()) throw UsageError("--edit is for one volume");
   const TracedScene scene = readTracedScene(objects, session);
+  expectSameOnAllRanks(session.ranks(), hashOf(scene), options.input);
   const Camera camera = makeCamera(options.camera, sceneBounds(scene));
   SceneVoxLinkOptions how;
   how.resolution = options.resolution.value_or(how.resolution);
@@ -170,15 +215,16 @@ Outcome traceObjects(const TraceOptions& options, const SceneObjects& objects, S
   const std::unique_ptr<gl::Context> context = chooseContext(options.backend);
   SceneVoxLink voxlink(scene, how, context.get(), session.progress());
   voxlink.light(makeLighting(options.light), options.shadows.value_or(Shadows::rays));
-  const Image picture = voxlink.trace(camera, session.progress());
+  const Image picture = traceTogether(voxlink, camera, session);
   reportStatistics(voxlink.statistics(), session);
+  reportRanks(voxlink.statistics(), camera, session);
   if (options.turn > 0) {
     measureTurns(camera, options.turn, session, [&](const Camera& view) {
       if (options.revoxelise) voxlink.update(scene, session.progress());
-      voxlink.trace(view, session.progress());
+      traceTogether(voxlink, view, session);
     });
   }
-  writePicture(options.picture, picture, session);
+  if (session.ranks().isRoot()) writePicture(options.picture, picture, session);
   return Outcome::done;
 }
 
@@ -198,6 +244,7 @@ Outcome trace(TraceOptions options, const CLI::App& command, Session& session) {
   if (options.revoxelise) throw UsageError("--revoxelise is for meshes, spheres and scenes of several objects");
   const TracedVolume traced =
       isAttenuationFile(options.input) ? readFile(options, session) : readVolumeToTrace(options, session);
+  expectSameOnAllRanks(session.ranks(), contentHash(std::as_bytes(std::span(traced.grid.codes))), options.input);
   const Camera camera = makeCamera(options.camera, worldBounds(traced.grid.placement, traced.grid.dims));
   const Lighting lighting = makeLighting(options.light);
   std::optional<TransferFunction> edited;
@@ -213,12 +260,13 @@ Outcome trace(TraceOptions options, const CLI::App& command, Session& session) {
   VoxLink voxlink(traced.grid, traced.transfer, options.voxlink, context.get(), session.progress());
   if (edited) voxlink.edit(traced.grid, *edited, session.progress());
   voxlink.light(lighting, options.shadows.value_or(Shadows::attenuation));
-  const Image picture = voxlink.trace(camera, session.progress());
+  const Image picture = traceTogether(voxlink, camera, session);
   reportStatistics(voxlink.statistics(), session);
+  reportRanks(voxlink.statistics(), camera, session);
   if (options.turn > 0) {
-    measureTurns(camera, options.turn, session, [&](const Camera& view) { voxlink.trace(view, session.progress()); });
+    measureTurns(camera, options.turn, session, [&](const Camera& view) { traceTogether(voxlink, view, session); });
   }
-  writePicture(options.picture, picture, session);
+  if (session.ranks().isRoot()) writePicture(options.picture, picture, session);
   return Outcome::done;
 }
 
@@ -310,7 +358,7 @@ Command addTrace(CLI::App& program, CommonOptions& common) {
   addLightOptions(*command, options->light);
   addVolumeOptions(*command, options->raw);
   addCommonOptions(*command, common);
-  return {command, [options, command](Session& session) { return trace(*options, *command, session); }};
+  return {command, [options, command](Session& session) { return trace(*options, *command, session); }, true};
 }
 
 }  // namespace freevoxel

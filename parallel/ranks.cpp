@@ -3,8 +3,10 @@
 #include <omp.h>
 #include <sched.h>
 #include <stdlib.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <climits>
 #include <cstring>
 #include <exception>
@@ -12,6 +14,12 @@
 #include <vector>
 
 namespace freevoxel {
+
+std::string hostName() {
+  std::array<char, 256> name{};
+  gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
 
 bool startedByLauncher() {
   // Open MPI's mpirun; PMI of MPICH, Intel MPI and Slurm; PMIx of Slurm and others.

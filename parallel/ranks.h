@@ -79,6 +79,9 @@ struct RankFailed {
   Failure failure;
 };
 
+/// Of the machine this process runs on; empty if it has no name.
+std::string hostName();
+
 /// Whether the environment is that of a process started by a launcher of MPI programs.
 bool startedByLauncher();
 

@@ -252,13 +252,16 @@ void GlVoxLink::light(const Lighting& lighting, const Camera& camera) {
   lit_ = true;
 }
 
-Image GlVoxLink::trace(const Camera& camera, int steps, int& passes) {
+Image GlVoxLink::trace(const Camera& camera, ImageRows rows, int steps, int& passes) {
+  const glm::ivec2 size(camera.imageSize.x, rows.count);
+  passes = 0;
+  if (rows.count == 0) return Image(size, 4);
   check(steps >= 1 && steps <= kMostSteps, "steps are in their range");
   glm::dmat4 voxelsFromWorld = glm::inverse(placement_.worldFromIndex());
   voxelsFromWorld[3] += glm::dvec4(0.5, 0.5, 0.5, 0.0);
   const double unit = placement_.unitLength();
   const PixelRays pixelRays(camera, voxelsFromWorld, 0.5 * glm::dvec3(bricks_.low + bricks_.high), unit);
-  const uint64_t rayCount = uint64_t(camera.imageSize.x) * uint64_t(camera.imageSize.y);
+  const uint64_t rayCount = uint64_t(size.x) * uint64_t(size.y);
   glFinish();
   if (rays_.bytes() < rayCount * sizeof(RayState)) {
     memory_.release(rays_);
@@ -267,7 +270,8 @@ Image GlVoxLink::trace(const Camera& camera, int steps, int& passes) {
   if (active_.id() == 0) active_ = memory_.allocate(sizeof(uint32_t), "the count of active rays");
   useBuffers(traceRays_);
   const GLuint id = traceRays_.id();
-  glProgramUniform2i(id, 5, camera.imageSize.x, camera.imageSize.y);
+  glProgramUniform2i(id, 5, size.x, size.y);
+  glProgramUniform1i(id, 16, rows.first);
   pixelRays.set(traceRays_, 6, 9);
   setMatrix(traceRays_, 12, glm::dmat3(voxelsFromWorld) * unit);
   glProgramUniform1i(id, 13, steps);
@@ -277,7 +281,7 @@ Image GlVoxLink::trace(const Camera& camera, int steps, int& passes) {
     glProgramUniform1i(id, 14, passes == 1 ? 1 : 0);
     fillWithZeros(active_);
     bindStorage({&brickWords_, &brickHeaders_, &fragments_, &materials_, &light, &rays_, &active_});
-    dispatch(traceRays_, uint64_t(camera.imageSize.x + 7) / 8, uint64_t(camera.imageSize.y + 7) / 8);
+    dispatch(traceRays_, uint64_t(size.x + 7) / 8, uint64_t(size.y + 7) / 8);
     uint32_t active = 0;
     glFinish();
     read(active_, std::span(&active, 1));
@@ -285,7 +289,7 @@ Image GlVoxLink::trace(const Camera& camera, int steps, int& passes) {
   }
   std::vector<RayState> rays(static_cast<size_t>(rayCount));
   read(rays_, std::span(rays));
-  Image picture(camera.imageSize, 4);
+  Image picture(size, 4);
   for (size_t i = 0; i < rays.size(); ++i) {
     float* pixel = picture.pixels.data() + 4 * i;
     pixel[0] = rays[i].red;

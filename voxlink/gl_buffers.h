@@ -13,6 +13,7 @@
 #include "gl/objects.h"
 #include "voxlink/buffers.h"
 #include "voxlink/gl_memory.h"
+#include "voxlink/image_rows.h"
 #include "voxlink/shadows.h"
 
 namespace freevoxel {
@@ -44,7 +45,7 @@ class GlVoxLink {
   void unlit() { lit_ = false; }
 
   /// Like traceRays. `steps` of every ray per pass, 1 to kMostSteps; `passes` tells how many it took.
-  Image trace(const Camera& camera, int steps, int& passes);
+  Image trace(const Camera& camera, ImageRows rows, int steps, int& passes);
 
   /// llvmpipe ends an invocation silently after 65535 turns of its loops.
   static constexpr int kMostSteps = 32768;

@@ -336,8 +336,8 @@ void GlScene::useBuffers(const gl::Program& program) const {
   glProgramUniform1i(program.id(), 4, bricks_.edge);
 }
 
-Image GlScene::trace(const SceneTracing& tracing, const Camera& camera, int steps, uint64_t& rays, int& passes,
-                     Progress& progress) {
+Image GlScene::trace(const SceneTracing& tracing, const Camera& camera, ImageRows rows, int steps, uint64_t& rays,
+                     int& passes, Progress& progress) {
   check(steps >= 1 && steps <= kMostSteps, "steps are in their range");
   const uint64_t lampCount = tracing.lighting.lights.size();
   const bool shadowRays = tracing.shadows == Shadows::rays && lampCount > 0;
@@ -354,7 +354,10 @@ Image GlScene::trace(const SceneTracing& tracing, const Camera& camera, int step
         "need {}; raise --ray-buffer",
         rayBytes_, lampCount, tracing.maxDepth, 4 * (2 * reserve + 2 * (newPerRay + 1)) * sizeof(RayRecord)));
   }
-  const glm::ivec2 size = camera.imageSize;
+  const glm::ivec2 size(camera.imageSize.x, rows.count);
+  rays = 0;
+  passes = 0;
+  if (rows.count == 0) return Image(size, 4);
   const uint64_t tiled = uint64_t((size.x + 7) / 8) * uint64_t((size.y + 7) / 8) * 64;
   const uint64_t pixels = uint64_t(size.x) * uint64_t(size.y);
   if (pixels > uint64_t(INT_MAX) / 4) throw InputError("VoxLink: the picture has more pixels than can be counted");
@@ -392,6 +395,7 @@ Image GlScene::trace(const SceneTracing& tracing, const Camera& camera, int step
   voxelsFromWorld[3] = glm::dvec4(-glm::dvec3(space_.origin) / space_.edge, 1.0);
   const PixelRays pixelRays(camera, voxelsFromWorld, 0.5 * glm::dvec3(bricks_.low + bricks_.high), space_.edge);
   glProgramUniform2i(id, 5, size.x, size.y);
+  glProgramUniform1i(id, 23, rows.first);
   pixelRays.set(traceScene_, 6, 9);
   glProgramUniform1i(id, 12, steps);
   glProgramUniform1i(id, 13, lit_ ? 1 : 0);

@@ -13,6 +13,7 @@
 #include "gl/context.h"
 #include "gl/objects.h"
 #include "voxlink/gl_memory.h"
+#include "voxlink/image_rows.h"
 #include "voxlink/scene_buffers.h"
 #include "voxlink/trace_scene.h"
 
@@ -41,7 +42,7 @@ class GlScene {
 
   /// Like traceScene. `steps` of every ray per pass, 1 to kMostSteps; the number of steps and the size of the ray
   /// buffer change no bit.
-  Image trace(const SceneTracing& tracing, const Camera& camera, int steps, uint64_t& rays, int& passes,
+  Image trace(const SceneTracing& tracing, const Camera& camera, ImageRows rows, int steps, uint64_t& rays, int& passes,
               Progress& progress);
 
   /// llvmpipe ends an invocation silently after 65535 turns of its loops.

@@ -124,7 +124,7 @@ void SceneVoxLink::light(const Lighting& lighting, Shadows shadows) {
   if (volumes) state.shares = volumeShares(state.buffers, state.voxels, lighting, shadows);
 }
 
-Image SceneVoxLink::trace(const Camera& camera, Progress& progress) {
+Image SceneVoxLink::trace(const Camera& camera, ImageRows rows, Progress& progress) {
   State& state = *state_;
   const Timer timer(state.statistics.traceSeconds);
   std::vector<uint32_t> light;
@@ -132,11 +132,11 @@ Image SceneVoxLink::trace(const Camera& camera, Progress& progress) {
   const SceneTracing tracing{state.lighting, state.shadows, state.options.maxDepth};
   if (state.onGpu) {
     state.onGpu->setVolumeLight(light);
-    return state.onGpu->trace(tracing, camera, state.options.steps, state.statistics.rays, state.statistics.passes,
-                              progress);
+    return state.onGpu->trace(tracing, camera, rows, state.options.steps, state.statistics.rays,
+                              state.statistics.passes, progress);
   }
   state.statistics.passes = 1;
-  return traceScene(state.buffers, state.voxels, light, tracing, camera, state.statistics.rays, progress);
+  return traceScene(state.buffers, state.voxels, light, tracing, camera, rows, state.statistics.rays, progress);
 }
 
 const SceneVoxLinkStatistics& SceneVoxLink::statistics() const {

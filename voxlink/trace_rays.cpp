@@ -9,17 +9,17 @@
 namespace freevoxel {
 
 Image traceRays(const VoxLinkBuffers& buffers, std::span<const VoxelMaterial> materials,
-                std::span<const uint32_t> light, const Camera& camera, Progress& progress) {
+                std::span<const uint32_t> light, const Camera& camera, ImageRows rows, Progress& progress) {
   check(light.empty() || light.size() == buffers.fragments.size(), "every fragment has light");
   const ViewFrame frame = viewFrame(camera);
   const glm::dmat4 indexFromWorld = glm::inverse(buffers.placement.worldFromIndex());
   const double unit = buffers.placement.unitLength();
-  Image picture(camera.imageSize, 4);
-  progress.begin("tracing", uint64_t(camera.imageSize.y), "rows");
+  Image picture(glm::ivec2(camera.imageSize.x, rows.count), 4);
+  progress.begin("tracing", uint64_t(rows.count), "rows");
 #pragma omp parallel for schedule(dynamic, 4)
-  for (int y = 0; y < camera.imageSize.y; ++y) {
+  for (int y = 0; y < rows.count; ++y) {
     for (int x = 0; x < camera.imageSize.x; ++x) {
-      const Ray ray = pixelRay(frame, glm::dvec2(x, y) + 0.5);
+      const Ray ray = pixelRay(frame, glm::dvec2(x, rows.first + y) + 0.5);
       const glm::dvec3 origin = glm::dvec3(indexFromWorld * glm::dvec4(ray.origin, 1.0)) + 0.5;
       const glm::dvec3 direction(indexFromWorld * glm::dvec4(ray.direction * unit, 0.0));
       glm::vec3 gathered(0.0f);

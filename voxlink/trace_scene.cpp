@@ -399,28 +399,30 @@ std::vector<uint32_t> lightVolumes(const SceneBuffers& buffers, const SceneVoxel
 }
 
 Image traceScene(const SceneBuffers& buffers, const SceneVoxels& scene, std::span<const uint32_t> light,
-                 const SceneTracing& tracing, const Camera& camera, uint64_t& rays, Progress& progress) {
+                 const SceneTracing& tracing, const Camera& camera, ImageRows rows, uint64_t& rays,
+                 Progress& progress) {
   check(light.empty() || light.size() == buffers.fragments.size(), "every fragment has light");
   const ViewFrame frame = viewFrame(camera);
   const SceneTracer tracer(buffers, scene, light, tracing);
-  std::vector<uint32_t> sums(size_t(camera.imageSize.x) * size_t(camera.imageSize.y) * 4);
-  progress.begin("tracing", uint64_t(camera.imageSize.y), "rows");
+  const glm::ivec2 size(camera.imageSize.x, rows.count);
+  std::vector<uint32_t> sums(size_t(size.x) * size_t(size.y) * 4);
+  progress.begin("tracing", uint64_t(size.y), "rows");
   uint64_t count = 0;
 #pragma omp parallel for schedule(dynamic, 4) reduction(+ : count)
-  for (int y = 0; y < camera.imageSize.y; ++y) {
-    for (int x = 0; x < camera.imageSize.x; ++x) {
-      const Ray seen = pixelRay(frame, glm::dvec2(x, y) + 0.5);
+  for (int y = 0; y < size.y; ++y) {
+    for (int x = 0; x < size.x; ++x) {
+      const Ray seen = pixelRay(frame, glm::dvec2(x, rows.first + y) + 0.5);
       SceneRay ray;
       ray.origin = scene.grid.voxelsFromWorld(seen.origin);
       ray.direction = seen.direction;
-      count += tracer.tracePixel(ray, sums.data() + 4 * (size_t(y) * size_t(camera.imageSize.x) + size_t(x)));
+      count += tracer.tracePixel(ray, sums.data() + 4 * (size_t(y) * size_t(size.x) + size_t(x)));
     }
 #pragma omp critical(freevoxelTraceSceneProgress)
     progress.advance(1);
   }
   progress.end();
   rays = count;
-  return picture(sums, tracing.lighting, camera.imageSize);
+  return picture(sums, tracing.lighting, size);
 }
 
 }  // namespace freevoxel

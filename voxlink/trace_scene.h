@@ -9,6 +9,7 @@
 #include "base/image.h"
 #include "base/light.h"
 #include "base/progress.h"
+#include "voxlink/image_rows.h"
 #include "voxlink/scene_buffers.h"
 #include "voxlink/scene_light.h"
 
@@ -30,9 +31,9 @@ struct SceneTracing {
   int maxDepth = 8;                 ///< how often a ray may be reflected or refracted
 };
 
-/// Premultiplied linear RGBA. `light` is lightVolumes. `rays`: view, reflected and shadow rays. Same bytes for any
-/// thread count.
+/// Premultiplied linear RGBA of the rows. `light` is lightVolumes. `rays`: view, reflected and shadow rays. Same bytes
+/// for any thread count.
 Image traceScene(const SceneBuffers& buffers, const SceneVoxels& scene, std::span<const uint32_t> light,
-                 const SceneTracing& tracing, const Camera& camera, uint64_t& rays, Progress& progress);
+                 const SceneTracing& tracing, const Camera& camera, ImageRows rows, uint64_t& rays, Progress& progress);
 
 }  // namespace freevoxel

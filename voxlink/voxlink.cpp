@@ -144,7 +144,7 @@ void VoxLink::light(const Lighting& lighting, Shadows shadows) {
   state_->findShares();
 }
 
-Image VoxLink::trace(const Camera& camera, Progress& progress) {
+Image VoxLink::trace(const Camera& camera, ImageRows rows, Progress& progress) {
   State& state = *state_;
   VoxLinkStatistics& statistics = state.statistics;
   if (!state.lighting.unlit() && !state.lit) {
@@ -158,9 +158,9 @@ Image VoxLink::trace(const Camera& camera, Progress& progress) {
     state.lit = state.lighting.shading == Shading::none;
   }
   const Stopwatch watch(statistics.traceSeconds);
-  if (state.onGpu) return state.onGpu->trace(camera, state.options.steps, statistics.passes);
+  if (state.onGpu) return state.onGpu->trace(camera, rows, state.options.steps, statistics.passes);
   statistics.passes = 1;
-  return traceRays(state.buffers, state.materials, state.light, camera, progress);
+  return traceRays(state.buffers, state.materials, state.light, camera, rows, progress);
 }
 
 const VoxLinkStatistics& VoxLink::statistics() const {

@@ -12,6 +12,7 @@
 #include "gl/context.h"
 #include "hierarchy/value_grid.h"
 #include "volume/transfer_function.h"
+#include "voxlink/image_rows.h"
 #include "voxlink/shadows.h"
 
 namespace freevoxel {
@@ -56,7 +57,9 @@ class VoxLink {
   void light(const Lighting& lighting, Shadows shadows);
 
   /// Premultiplied linear RGBA, see traceRays. Both backends agree within what floats lose.
-  Image trace(const Camera& camera, Progress& progress);
+  Image trace(const Camera& camera, Progress& progress) { return trace(camera, allRows(camera), progress); }
+  /// Rows of it; of every partition of an image they have the same bits.
+  Image trace(const Camera& camera, ImageRows rows, Progress& progress);
 
   const VoxLinkStatistics& statistics() const;
 

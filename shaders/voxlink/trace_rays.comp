@@ -9,7 +9,7 @@ layout(std430, binding = 4) readonly buffer Light { uint voxelLight[]; };
 layout(std430, binding = 5) buffer Rays { RayState rays[]; };
 layout(std430, binding = 6) buffer Active { uint activeRays; };
 
-layout(location = 5) uniform ivec2 imageSize;
+layout(location = 5) uniform ivec2 imageSize;  // the rows that are traced
 // Where a pixel's ray passes the plane of focus, in voxels, and the way there from the eye, in shortest voxel edges:
 // of pixel (0,0), per pixel right, per pixel down.
 layout(location = 6) uniform vec3 place[3];
@@ -18,12 +18,13 @@ layout(location = 12) uniform mat3 indexFromLength;
 layout(location = 13) uniform int steps;
 layout(location = 14) uniform int firstPass;
 layout(location = 15) uniform int lit;
+layout(location = 16) uniform int firstRow;
 
 void main() {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
   if (pixel.x >= imageSize.x || pixel.y >= imageSize.y) return;
   int at = pixel.y * imageSize.x + pixel.x;
-  vec2 centre = vec2(pixel) + 0.5;
+  vec2 centre = vec2(pixel.x, pixel.y + firstRow) + 0.5;
   vec3 origin = place[0] + centre.x * place[1] + centre.y * place[2];
   vec3 fromEye = way[0] + centre.x * way[1] + centre.y * way[2];
   float distance_ = length(fromEye);

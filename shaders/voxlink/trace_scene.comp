@@ -20,7 +20,7 @@ layout(std430, binding = 12) buffer Control { RayControl control; };
 // Four per pixel: red, green, blue, what escapes.
 layout(std430, binding = 13) buffer Sums { uint sums[]; };
 
-layout(location = 5) uniform ivec2 imageSize;
+layout(location = 5) uniform ivec2 imageSize;  // the rows that are traced
 // As in trace_rays.comp, both in voxels.
 layout(location = 6) uniform vec3 place[3];
 layout(location = 9) uniform vec3 way[3];
@@ -35,6 +35,7 @@ layout(location = 19) uniform float highlight;
 layout(location = 20) uniform float exponent;
 layout(location = 21) uniform float sumScale;
 layout(location = 22) uniform float escapeScale;
+layout(location = 23) uniform int firstRow;
 
 const float kSphereSlack = 1e-3;
 // Turns of all loops that an invocation may take before it has to wait for the next pass.
@@ -300,7 +301,7 @@ bool firstRay(uint at, out RayRecord ray, out bool outside) {
   uint tile = at / 64u, tiles = uint(imageSize.x + 7) / 8u;
   ivec2 pixel = ivec2(tile % tiles, tile / tiles) * 8 + ivec2(at % 8u, at / 8u % 8u);
   outside = pixel.x >= imageSize.x || pixel.y >= imageSize.y;
-  vec2 centre = vec2(pixel) + 0.5;
+  vec2 centre = vec2(pixel.x, pixel.y + firstRow) + 0.5;
   vec3 origin = place[0] + centre.x * place[1] + centre.y * place[2];
   vec3 fromEye = way[0] + centre.x * way[1] + centre.y * way[2];
   float distance_ = length(fromEye);

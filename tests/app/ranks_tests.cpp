@@ -114,6 +114,35 @@ TEST_F(RanksOfProgram, DrawTheSameBits) {
   EXPECT_EQ(two["partition"], "round-robin");
 }
 
+// By bands of rows, of a volume and of a scene with a mirror; five ranks have rows of different number.
+TEST_F(RanksOfProgram, TraceTheSameBits) {
+  const std::string volume = "trace cloud.nrrd --transfer t.json --size 37x23 --light-direction 1,1,0.3 ";
+  writeBytes(folder + "/balls.csv", "x,y,z,radius\n0,0,0,1\n1.5,0.4,0.2,0.7\n0.3,1.6,-0.4,0.6\n");
+  writeBytes(
+      folder + "/balls.json",
+      R"({"spheres": [{"file": "balls.csv", "material": "chrome"}], "materials": {"chrome": {"kind": "mirror"}}})");
+  const std::string scene = "trace balls.json --resolution 24 --size 31x18 --light-direction 1,1,0.3 ";
+  for (const bool ofVolume : {true, false}) {
+    const std::string& call = ofVolume ? volume : scene;
+    run(call + "-o alone.exr --backend cpu --stats alone.json");
+    const nlohmann::json alone = readJson(folder + "/alone.json");
+    const int ranks = ofVolume ? 2 : 5;
+    runRanks(ranks, call + "-o bands.exr --backend cpu --stats bands.json");
+    expectIdentical("alone.exr", "bands.exr");
+    const nlohmann::json bands = readJson(folder + "/bands.json");
+    ASSERT_EQ(bands["ranks"].size(), size_t(ranks));
+    int rows = 0;
+    for (const nlohmann::json& rank : bands["ranks"])
+      rows += rank["rows"].get<int>();
+    EXPECT_EQ(rows, ofVolume ? 23 : 18);
+    EXPECT_EQ(bands.value("rays", 0), alone.value("rays", 0));
+    run(call + "-o alone.exr --backend gl");
+    runRanks(2, call + "-o bands.exr --backend gl");
+    expectIdentical("alone.exr", "bands.exr");
+  }
+  expectFailure(mpirun(folder, 2, words("trace no.ply -o no.png")), "no.ply");
+}
+
 // With interpolated attenuation a rank reads the bricks of its own blocks, and what touches them.
 TEST_F(RanksOfProgram, ReadWhatTheyDraw) {
   run("generate checkered-cloud --dims 200,20,24 -o long.nrrd");
