@@ -44,13 +44,14 @@ figures() {
   plot "$out/figure4.png" 'set xlabel "position, voxels"; set ylabel "weight"; set yrange [0:2]' \
     "'$d' using 1:2 with lines title 'one kernel', '$d' using 1:3 with lines lw 2 title 'sum over a plane of voxels',
      '$d' using 1:4 with lines title 'the same of Gaussians of area 1', '$d' using 1:5 with lines title 'of peak 1'"
-  d=$scratch/figure6.dat
-  plot "$out/figure6-alpha.png" 'set xlabel "pixel of the middle row"; set ylabel "alpha"; set yrange [0:1.05]' \
-    "'$d' using 1:3 with lines title 'blended, Gaussian of peak 1', '$d' using 1:4 with lines title 'blended, normalised',
-     '$d' using 1:5 with lines title 'order-free kernels', '$d' using 1:6 with lines lw 2 title 'order-free cells',
-     '$d' using 1:2 with lines dt 2 lc 'black' title 'closed form'"
-  "$program" sheet "$scratch"/figure6-{blended-gaussian,blended-normalised,kernels,cells}.png --columns 4 \
-    -o "$out/figure6.png" --quiet
+  for d in figure6 figure6-slab; do
+    plot "$out/$d-alpha.png" 'set xlabel "pixel of the middle row"; set ylabel "alpha"; set yrange [0:1.05]' \
+      "'$scratch/$d.dat' using 1:3 with lines title 'blended, Gaussian of peak 1', '' using 1:4 with lines title 'blended, normalised',
+       '' using 1:5 with lines title 'order-free kernels', '' using 1:6 with lines lw 2 title 'order-free cells',
+       '' using 1:2 with lines dt 2 lc 'black' title 'closed form'"
+    "$program" sheet "$scratch/$d"-{blended-gaussian,blended-normalised,kernels,cells}.png --columns 4 -o "$scratch/$d.png" --quiet
+  done
+  "$program" sheet "$scratch"/figure6{,-slab}.png --columns 1 -o "$out/figure6.png" --quiet
 
   local head=$data/volumes/cthead_256x256x113_uint16_be.raw.gz
   if [ -e "$head" ]; then

@@ -20,22 +20,21 @@ namespace freevoxel::bench {
 
 namespace {
 
-constexpr glm::ivec3 kDims{44, 40, 36};
-constexpr double kOpacity = 0.04;
-
-/// A grey translucent box, every voxel alike: the paper's example.
+/// A grey box, every voxel alike: the paper's example.
 struct UniformBox {
+  glm::ivec3 dims;
+  double opacity;
   Volume volume;
   TransferFunction transfer;
   ValueGrid grid;
 };
 
-UniformBox uniformBox() {
-  UniformBox box;
-  box.volume.header.dims = kDims;
+UniformBox uniformBox(glm::ivec3 dims, double opacity) {
+  UniformBox box{dims, opacity, {}, {}, {}};
+  box.volume.header.dims = dims;
   box.volume.header.type = ValueType::u8;
   box.volume.data.assign(box.volume.header.bytes(), std::byte(128));
-  box.transfer.points = {{0.0, glm::dvec3(0.8), kOpacity}, {255.0, glm::dvec3(0.8), kOpacity}};
+  box.transfer.points = {{0.0, glm::dvec3(0.8), opacity}, {255.0, glm::dvec3(0.8), opacity}};
   box.grid = valueGrid(box.volume, box.transfer);
   return box;
 }
@@ -47,16 +46,16 @@ std::ofstream openText(const std::string& path) {
 }
 
 /// Attenuation in the middle slice along four of the 26 directions, side by side (Fig. 2).
-void drawAttenuation(const AttenuationFile& file, const std::string& path) {
+void drawAttenuation(const UniformBox& box, const AttenuationFile& file, const std::string& path) {
   constexpr glm::ivec3 kShown[] = {{1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {-1, 1, 1}};
   constexpr int kScale = 4, kGap = 8;
-  const glm::ivec2 slice(kDims.x * kScale, kDims.y * kScale);
+  const glm::ivec2 slice(box.dims.x * kScale, box.dims.y * kScale);
   Image picture({int(std::size(kShown)) * (slice.x + kGap) - kGap, slice.y}, 4);
   for (size_t i = 0; i < std::size(kShown); ++i) {
     const int direction = shared::directionIndex(kShown[i].x, kShown[i].y, kShown[i].z);
     for (int y = 0; y < slice.y; ++y) {
       for (int x = 0; x < slice.x; ++x) {
-        const glm::ivec3 voxel(x / kScale, kDims.y - 1 - y / kScale, kDims.z / 2);
+        const glm::ivec3 voxel(x / kScale, box.dims.y - 1 - y / kScale, box.dims.z / 2);
         const BrickView brick = file.brick(file.findBrick(voxel / file.brickEdge()).value());
         const glm::ivec3 local = voxel - brick.origin;
         const size_t step = brick.steps[size_t((local.z * brick.edge + local.y) * brick.edge + local.x)];
@@ -94,22 +93,22 @@ void writeWeights(const std::string& path) {
 }
 
 /// The ray's way through the box, in shortest voxel edges (which are 1 here, as are world lengths).
-double wayThrough(const Ray& ray) {
+double wayThrough(const UniformBox& box, const Ray& ray) {
   double enter = 0.0, leave = INFINITY;
   for (int axis = 0; axis < 3; ++axis) {
     const double t0 = (-0.5 - ray.origin[axis]) / ray.direction[axis];
-    const double t1 = (double(kDims[axis]) - 0.5 - ray.origin[axis]) / ray.direction[axis];
+    const double t1 = (double(box.dims[axis]) - 0.5 - ray.origin[axis]) / ray.direction[axis];
     enter = std::max(enter, std::min(t0, t1));
     leave = std::min(leave, std::max(t0, t1));
   }
   return std::max(0.0, leave - enter);
 }
 
-/// The box by every method, and the alpha of the middle row beside its closed form (Fig. 6).
-void drawLeak(const UniformBox& box, const AttenuationFile& file, const std::string& folder) {
+/// The box by every method, and the alpha of the middle row beside its closed form (Fig. 6): NAME-*.png and NAME.dat.
+void drawLeak(const UniformBox& box, const AttenuationFile& file, const std::string& name) {
   Splatter splatter(box.grid, &file, box.transfer, Backend::cpu);
   const Camera camera =
-      orbitCamera(worldBounds(box.grid.placement, kDims), {0.6, 0.35, std::nullopt}, {360, 300}, 0.5, std::nullopt);
+      orbitCamera(worldBounds(box.grid.placement, box.dims), {0.6, 0.35, std::nullopt}, {360, 300}, 0.5, std::nullopt);
   SplatOptions kernels, cells;
   kernels.footprint = Footprint::kernel;
   kernels.attenuation = cells.attenuation = AttenuationSource::interpolated;
@@ -119,14 +118,14 @@ void drawLeak(const UniformBox& box, const AttenuationFile& file, const std::str
                             resolve(splatter.render(camera, cells, silentProgress()).sums, Formula::normalised)};
   const char* const names[] = {"blended-gaussian", "blended-normalised", "kernels", "cells"};
   for (size_t i = 0; i < std::size(pictures); ++i)
-    writePng(fmt::format("{}/figure6-{}.png", folder, names[i]), pictures[i], {{"Software", "freevoxel"}});
-  std::ofstream rows = openText(folder + "/figure6.dat");
+    writePng(fmt::format("{}-{}.png", name, names[i]), pictures[i], {{"Software", "freevoxel"}});
+  std::ofstream rows = openText(name + ".dat");
   rows << "# pixel  closed form  blended, Gaussian of peak 1  blended, normalised kernel  kernels  cells\n";
   const ViewFrame frame = viewFrame(camera);
-  const double extinction = -std::log1p(-kOpacity);
+  const double extinction = -std::log1p(-box.opacity);
   const int y = camera.imageSize.y / 2;
   for (int x = 0; x < camera.imageSize.x; ++x) {
-    rows << x << ' ' << -std::expm1(-extinction * wayThrough(pixelRay(frame, {x + 0.5, y + 0.5})));
+    rows << x << ' ' << -std::expm1(-extinction * wayThrough(box, pixelRay(frame, {x + 0.5, y + 0.5})));
     for (const Image& picture : pictures)
       rows << ' ' << picture.at(x, y)[3];
     rows << '\n';
@@ -137,13 +136,19 @@ void drawLeak(const UniformBox& box, const AttenuationFile& file, const std::str
 
 void drawFigures(const std::string& folder, const Folders& folders) {
   std::filesystem::create_directories(folder);
-  const UniformBox box = uniformBox();
-  const std::string path = folders.cache + "/uniform-box.fvx";
-  precompute(box.volume, box.transfer, path, {}, silentProgress());
-  const AttenuationFile file(path);
-  drawAttenuation(file, folder + "/figure2.png");
   writeWeights(folder + "/figure4.dat");
-  drawLeak(box, file, folder);
+  const auto fileOf = [&](const UniformBox& box, const std::string& name) {
+    const std::string path = folders.cache + "/" + name + ".fvx";
+    precompute(box.volume, box.transfer, path, {}, silentProgress());
+    return AttenuationFile(path);
+  };
+  const UniformBox box = uniformBox({44, 40, 36}, 0.04);
+  const AttenuationFile file = fileOf(box, "uniform-box");
+  drawAttenuation(box, file, folder + "/figure2.png");
+  drawLeak(box, file, folder + "/figure6");
+  // Of the same opacity as a whole: where a voxel takes much, in-order blending of overlapping kernels leaks, too.
+  const UniformBox slab = uniformBox({44, 40, 4}, 0.4);
+  drawLeak(slab, fileOf(slab, "uniform-slab"), folder + "/figure6-slab");
 }
 
 }  // namespace freevoxel::bench

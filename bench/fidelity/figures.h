@@ -7,8 +7,9 @@
 
 namespace freevoxel::bench {
 
-/// Writes figure2.png, figure4.dat, figure6-*.png and figure6.dat; text files are for plotting, columns named in the
-/// first line. Throws MachineError.
+/// Writes figure2.png, figure4.dat and, of a translucent box and of a thin slab of dense voxels, figure6-*.png,
+/// figure6.dat, figure6-slab-*.png and figure6-slab.dat; text files are for plotting, columns named in the first line.
+/// Throws MachineError.
 void drawFigures(const std::string& folder, const Folders& folders);
 
 }  // namespace freevoxel::bench
