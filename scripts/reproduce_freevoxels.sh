@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Draws the FreeVoxels paper's Figures 2 to 7 and measures the tables of docs/fidelity.md and docs/results/hierarchy, into
+# Draws the FreeVoxels paper's Figures 2 to 7 and measures the tables of docs/fidelity.md and docs/results/hierarchy.md, into
 # docs/results:
 #   scripts/reproduce_freevoxels.sh [figures] [quality] [shadows] [inside] [hidden] [lights] [levels]
 # All of them unless some are named. Builds the release preset if need be. DATA is the folder with the real volumes
@@ -85,10 +85,7 @@ for what in "${wanted[@]}"; do
     figures) figures ;;
     quality | shadows | hidden) "${fidelity[@]}" "$what" -o "$out/$what.md" ;;
     inside) "${fidelity[@]}" inside --columns cloud,cthead -o "$out/inside.md" ;;
-    levels)
-      mkdir -p docs/results/hierarchy
-      "$build/bin/freevoxel_hierarchy" --data "$data" --transfers examples/transfer --cache "$cache" --views "$views" \
-        --columns cloud,shells,carp,cthead,cthead-coloured -o docs/results/hierarchy/levels.md ;;
+    levels) DATA=$data CACHE=$cache BUILD=$build scripts/bench_hierarchy.sh levels ;;
     lights) "${fidelity[@]}" lights --columns cloud,cthead,embryo -o "$out/lights.md" ;;
     *) echo "expected figures, quality, shadows, inside, hidden, lights or levels, found '$what'" >&2; exit 2 ;;
   esac

@@ -39,9 +39,10 @@ struct CellCounts {
   std::vector<uint64_t> blocksOfLevel;  ///< of these, at each level
   uint64_t culledBlocks = 0;            ///< off the image
   uint64_t hiddenBlocks = 0;
-  uint64_t emptyBlocks = 0;  ///< nothing in them is visible
-  uint64_t fragments = 0;    ///< pixels that the blocks' bounding rectangles cover
-  uint64_t pieces = 0;       ///< of rays between two planes of voxels, traced; not counted by gl
+  uint64_t emptyBlocks = 0;    ///< nothing in them is visible
+  uint64_t fragments = 0;      ///< pixels that the blocks' bounding rectangles cover
+  uint64_t pieces = 0;         ///< of rays between two planes of voxels, traced; not counted by gl
+  uint64_t visiblePieces = 0;  ///< of these, in which something is visible
 };
 
 /// Adds blocks to sums that start at zero. Each block gives each pixel one contribution, rounded to whole quanta, so

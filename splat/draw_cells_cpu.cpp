@@ -103,8 +103,8 @@ class CpuCellCanvas final : public CellCanvas {
       if (ready_[size_t(i)].drawn) prepare(frame, ready_[size_t(i)], prepared_[size_t(i)]);
     }
     const glm::ivec2 tiles = (image_.size + (kTile - 1)) / kTile;
-    uint64_t pieces = 0;
-#pragma omp parallel for schedule(dynamic, 1) reduction(+ : pieces)
+    uint64_t pieces = 0, visible = 0;
+#pragma omp parallel for schedule(dynamic, 1) reduction(+ : pieces, visible)
     for (int tile = 0; tile < tiles.x * tiles.y; ++tile) {
       const glm::ivec2 low = glm::ivec2(tile % tiles.x, tile / tiles.x) * kTile;
       const glm::ivec2 high = glm::min(low + kTile, image_.size);
@@ -113,17 +113,18 @@ class CpuCellCanvas final : public CellCanvas {
         const glm::ivec2 from = glm::max(low, ready_[i].bounds.low), to = glm::min(high, ready_[i].bounds.high);
         for (int y = from.y; y < to.y; ++y) {
           for (int x = from.x; x < to.x; ++x)
-            pieces += drawPixel(frame, prepared_[i], x, y);
+            drawPixel(frame, prepared_[i], x, y, pieces, visible);
         }
       }
     }
     counts.pieces += pieces;
+    counts.visiblePieces += visible;
   }
 
-  /// Gives the number of pieces traced.
-  uint64_t drawPixel(const CellFrame& frame, const Prepared& prepared, int x, int y) {
+  /// Adds the numbers of pieces traced, and of those with something visible.
+  void drawPixel(const CellFrame& frame, const Prepared& prepared, int x, int y, uint64_t& pieces, uint64_t& visible) {
     const PixelRay& ray = (*frame.rays)[size_t(y) * size_t(image_.size.x) + size_t(x)];
-    if (!(ray.sLow < ray.sHigh)) return 0;
+    if (!(ray.sLow < ray.sHigh)) return;
     const shared::RaySums sums = shared::traceBlock(
         prepared.reader, ray, prepared.layouts[ray.axisAndSide & shared::kRayAxisMask], frame.hiddenBelow);
     float* pixel = image_.at(x, y);
@@ -135,7 +136,8 @@ class CpuCellCanvas final : public CellCanvas {
     shared::splitDepth(sums.depth * shared::kDepth64FromLog2, high, low);
     pixel[4] += high;
     pixel[5] += low;
-    return uint64_t(sums.pieces);
+    pieces += uint64_t(sums.pieces);
+    visible += uint64_t(sums.visiblePieces);
   }
 
   glm::ivec2 size_;

@@ -122,6 +122,7 @@ Image drawCells(const FrameDrawing& frame, std::span<const VisibleBlock> blocks,
   statistics.emptyBlocks += counts.emptyBlocks;
   statistics.fragments += counts.fragments;
   statistics.pieces += counts.pieces;
+  statistics.visiblePieces += counts.visiblePieces;
   statistics.drawSeconds += secondsSince(drawStart);
   return sums;
 }

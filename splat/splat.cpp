@@ -66,6 +66,7 @@ void SplatStatistics::addCounts(const SplatStatistics& other) {
   hiddenSplats += other.hiddenSplats;
   fragments += other.fragments;
   pieces += other.pieces;
+  visiblePieces += other.visiblePieces;
   const auto addLevels = [](std::vector<uint64_t>& to, const std::vector<uint64_t>& from) {
     to.resize(std::max(to.size(), from.size()));
     for (size_t i = 0; i < from.size(); ++i)
@@ -475,6 +476,7 @@ Sums Splatter::draw(float quantum, std::span<const uint8_t> share, Progress& pro
   ++statistics.passes;
   statistics.blocks = statistics.culledBlocks = statistics.hiddenBlocks = statistics.emptyBlocks = 0;
   statistics.splats = statistics.culledSplats = statistics.hiddenSplats = statistics.fragments = statistics.pieces = 0;
+  statistics.visiblePieces = 0;
   statistics.blocksOfLevel.clear();
   statistics.splatsOfLevel.clear();
   std::vector<VisibleBlock> drawn = frame.blocks;

@@ -82,6 +82,7 @@ struct SplatStatistics {
   uint64_t hiddenSplats = 0;     ///< of kernels: dropped by Cull::hidden
   uint64_t fragments = 0;        ///< pixels that splats' bounding rectangles covered
   uint64_t pieces = 0;           ///< of cells: pieces of rays between two planes of voxels that were traced (cpu only)
+  uint64_t visiblePieces = 0;    ///< of these, in which something is visible
   int passes = 1;                ///< 1 + how often the quantum had to be raised
   std::string backend;           ///< "gl" or "cpu"
   std::string glRenderer;        ///< empty for cpu

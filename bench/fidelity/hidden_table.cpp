@@ -30,6 +30,7 @@ void addHidden(Table& table, const Scene& scene, const TableOptions& options) {
                   "culled against not (worst)",
                   "largest change of alpha",
                   "pieces of rays left out",
+                  "visible ones left out",
                   "blocks left out",
                   "draw time"};
   }
@@ -39,7 +40,7 @@ void addHidden(Table& table, const Scene& scene, const TableOptions& options) {
        {AttenuationSource::interpolated, AttenuationSource::stored, AttenuationSource::swept}) {
     Measured measured;
     float alpha = 0.0f;
-    uint64_t pieces = 0, allPieces = 0, hidden = 0, blocks = 0;
+    uint64_t pieces = 0, allPieces = 0, visible = 0, allVisible = 0, hidden = 0, blocks = 0;
     double seconds = 0.0, allSeconds = 0.0;
     for (const Camera& view : randomViews(scene.bounds(), std::min(kViews, options.views), options.imageSize)) {
       SplatOptions splats;
@@ -52,6 +53,8 @@ void addHidden(Table& table, const Scene& scene, const TableOptions& options) {
       alpha = std::max(alpha, largestAlphaChange(picture, expected));
       allPieces += all.statistics.pieces;
       pieces += culled.statistics.pieces;
+      allVisible += all.statistics.visiblePieces;
+      visible += culled.statistics.visiblePieces;
       blocks += all.statistics.blocks;
       hidden += culled.statistics.hiddenBlocks;
       allSeconds += all.statistics.drawSeconds;
@@ -60,6 +63,7 @@ void addHidden(Table& table, const Scene& scene, const TableOptions& options) {
     table.rows.push_back({scene.source.title, std::string(attenuationSourceName(source)), measured.text(),
                           fmt::format("{:.4f}", alpha),
                           fmt::format("{:.0f} %", 100.0 * (1.0 - double(pieces) / double(allPieces))),
+                          fmt::format("{:.0f} %", 100.0 * (1.0 - double(visible) / double(allVisible))),
                           fmt::format("{:.0f} %", 100.0 * double(hidden) / double(blocks)),
                           fmt::format("x {:.2f}", seconds / allSeconds)});
   }

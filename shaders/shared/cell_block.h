@@ -319,6 +319,7 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay finestRay, CellLayout l
   bool entered = false;         // whether it has come to something visible
   bool hidden = false;
   int traced = 0;
+  int visible = 0;
   bool eyeAbove = (finestRay.axisAndSide & kRayEyeAbove) != 0u;
   bool classified = layout_.matter >= 0;
   // The ray in places of the block's level. Scaled by a power of two, so exactly the same ray.
@@ -381,6 +382,7 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay finestRay, CellLayout l
       EXACT float stepLength = 0.5f * (high - low) * lengthPerPlane;
       float lightR = 1.0f, lightG = 1.0f, lightB = 1.0f;
       bool haveLight = false;
+      bool seen = false;
       for (int half_ = 0; half_ < 2; ++half_) {
         TableValue mean = halves[half_];
         if (!(mean.extinction > kLeastExtinction)) continue;
@@ -390,6 +392,7 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay finestRay, CellLayout l
           hidden = arriving < hiddenBelow && largestAttenuation(BLOCK_HAND_ON ray, layout_, k, nearEnd) < hiddenBelow;
           if (hidden) break;
         }
+        seen = true;
         EXACT float pieceDepth = mean.extinction * stepLength;
         EXACT float taken = absorbed(pieceDepth);
         EXACT float emitted = arriving * taken;
@@ -406,6 +409,7 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay finestRay, CellLayout l
         depth = depth + pieceDepth;
       }
       if (hidden) break;
+      if (seen) ++visible;
     }
   }
   RaySums sums;
@@ -415,6 +419,7 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay finestRay, CellLayout l
   sums.emission = emission;
   sums.depth = depth;
   sums.pieces = traced;
+  sums.visiblePieces = visible;
   return sums;
 }
 

@@ -65,10 +65,12 @@ struct CellLayout {
   int matter;  // the same in the array of classified voxels; -1: voxels have values, which is so at level 0 only
 };
 
-// What one block gives to one pixel; depth in log2. `pieces`: how many pieces of the ray that took.
+// What one block gives to one pixel; depth in log2. `pieces`: how many pieces of the ray that took,
+// `visiblePieces`: in how many of them something is visible.
 struct RaySums {
   float red, green, blue, emission, depth;
   int pieces;
+  int visiblePieces;
 };
 
 FREEVOXEL_END_SHARED
