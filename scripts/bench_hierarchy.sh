@@ -65,7 +65,7 @@ for part in "${wanted[@]}"; do
   case $part in
     levels) measure levels --columns cloud,shells,carp,cthead,cthead-coloured ;;
     refinement) measure refinement --columns cloud,shells,carp,cthead,cthead-coloured,cthead-opaque ;;
-    detail) measure detail --columns cloud,carp,cthead --size 512 ;;
+    detail) measure detail --columns cloud,cthead --size 512 ;;
     size)
       files=$(clouds)
       measure volume-size --files "$files"
@@ -91,6 +91,7 @@ averaged over 2^k x 2^k pixels. Pooled over 4 random orthographic views, in brac
 is the finest level drawn with one ray per pixel of the small picture: what sampling alone costs. Attenuation as by default.
 
 $(section levels)
+
 ## Refinement
 
 \`Splatter::refine\` (\`render --progressive\`), 4 random views of 256 x 256, perspective, every picture against the last, which is
@@ -98,24 +99,31 @@ checked to be the direct picture bit for bit. "Fewest", "first" and "last but on
 is by how much a picture was ever farther from the last than the one before it.
 
 $(section refinement)
+
 ![refinement of CThead, coloured](hierarchy/refinement.png)
 
 ## Frame time and PSNR over --lod
 
-512 x 512, one view, the C++ backend, median of 5.
+512 x 512, one view, the C++ backend, median of 5. With --lod above 0 default attenuation leaves
+out the near field, which takes the values of the whole volume: that is the difference where all blocks are of the finest
+level.
 
 $(section detail)
+
 ![--lod 0, 1.5, 3 and 6](hierarchy/lod.png)
 
 ## Cost over the size of the volume
 
 The same cloud at doubling resolutions, \`--lod 1\`, 256 x 256, median of 5, layout \`compact\`, every frame reading its bricks
-anew from the mapped file.
+anew from the mapped file. The machine was shared when these and the tables of time around it were measured, under a lock
+against builds only: ratios within a table count, not milliseconds.
 
 $(section volume-size)
+
 ## Cost over the size of the image
 
-The largest of these clouds, \`--lod 1\`.
+The largest of these clouds, \`--lod 1\`: cost goes with the pixels, and with the bricks that they need.
 
 $(section image-size)
+
 TEXT
