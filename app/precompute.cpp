@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "app/command.h"
-#include "app/level_options.h"
 #include "app/parse.h"
 #include "app/precompute_report.h"
+#include "app/program_memory.h"
 #include "base/atomic_file.h"
 #include "base/error.h"
 #include "parallel/distributed_precompute.h"
@@ -114,7 +114,7 @@ Outcome precomputeCommand(PrecomputeCommandOptions options, const CLI::App& comm
   const auto classify = [&](const TransferFunction& transfer) {
     if (transfer.isLabels) options.precompute.classification = labelClassification(options, command);
   };
-  if (options.memory) options.precompute.memoryBytes = withoutProgram(*options.memory);
+  if (options.memory) options.precompute.memoryBytes = memoryForData(*options.memory);
   if (options.resolution && (options.memory || session.ranks().rankCount() > 1)) {
     throw UsageError("--resolution holds the whole volume in one process: leave --memory and the launcher out");
   }

@@ -81,7 +81,11 @@ void CompactStore::endSlab() {
     Section& section = sections_[which];
     std::vector<Waiting>& waiting = waiting_[which];
     std::sort(waiting.begin(), waiting.end(), [](const Waiting& a, const Waiting& b) { return a.brick < b.brick; });
+    size_t bytes = 0;
+    for (const auto& [brick, frame] : waiting)
+      bytes += frame.size();
     Frame joined;
+    joined.reserve(bytes);
     for (const auto& [brick, frame] : waiting) {
       frames_[brick].offset[which] = section.bytes + joined.size();
       frames_[brick].bytes[which] = uint32_t(frame.size());

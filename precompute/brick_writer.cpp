@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "base/first_exception.h"
+#include "base/give_back.h"
 #include "base/grid.h"
 #include "precompute/hilbert.h"
 
@@ -114,7 +115,7 @@ void BrickWriter::complete(int pass, int slab) {
   }
   const glm::ivec3 slabDims(dims_.x, dims_.y, std::min(edge_, dims_.z - slab * edge_));
   const bool last = pass == 0 ? size_t(slab) + 1 == slabs_.size() : slab == 0;
-  if (last) planes_[size_t(pass)] = {};
+  if (last) giveBack(planes_[size_t(pass)]);
   advanced_(voxelCount(slabDims) * kDirectionsPerSection);
   writeSeconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }

@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "base/error.h"
+#include "base/give_back.h"
 
 namespace freevoxel {
 
@@ -65,13 +66,18 @@ void CodeSpool::append(std::span<const uint16_t> codes) {
 
 std::span<const uint16_t> CodeSpool::planes(int pass, int first, int count) {
   std::vector<uint16_t>& window = windows_[size_t(pass)];
-  window.resize(size_t(count) * planeVoxels_);
+  const size_t voxels = size_t(count) * planeVoxels_;
+  if (voxels > window.capacity()) {  // not old and new at once, nor more than is asked for
+    giveBack(window);
+    window.reserve(voxels);
+  }
+  window.resize(voxels);
   uint64_t offset = uint64_t(first) * rowBytes();
   for (size_t done = 0; done < window.size();) {
-    const size_t voxels = std::min(window.size() - done, kPortion);
-    narrow_.resize(voxels);
+    const size_t portion = std::min(window.size() - done, kPortion);
+    narrow_.resize(portion);
     auto* bytes = bytesPerCode_ == 1 ? narrow_.data() : reinterpret_cast<uint8_t*>(window.data() + done);
-    for (size_t left = voxels * size_t(bytesPerCode_); left > 0;) {
+    for (size_t left = portion * size_t(bytesPerCode_); left > 0;) {
       const ssize_t got = pread(descriptor_, bytes, left, off_t(offset));
       if (got < 0 && errno == EINTR) continue;
       if (got <= 0) throw failure(path_, "cannot read", got < 0 ? errno : EIO);
@@ -80,7 +86,7 @@ std::span<const uint16_t> CodeSpool::planes(int pass, int first, int count) {
       left -= size_t(got);
     }
     if (bytesPerCode_ == 1) std::copy(narrow_.begin(), narrow_.end(), window.begin() + ptrdiff_t(done));
-    done += voxels;
+    done += portion;
   }
   return window;
 }

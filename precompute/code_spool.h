@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "base/give_back.h"
 #include "precompute/sweep.h"
 
 namespace freevoxel {
@@ -27,7 +28,7 @@ class CodeSpool final : public CodePlanes {
   /// Throws MachineError. Keeps one window for each pass.
   std::span<const uint16_t> planes(int pass, int first, int count) override;
   /// Gives back the memory of a pass's window.
-  void release(int pass) override { windows_[size_t(pass)] = {}; }
+  void release(int pass) override { giveBack(windows_[size_t(pass)]); }
 
  private:
   uint64_t rowBytes() const { return planeVoxels_ * uint64_t(bytesPerCode_); }

@@ -11,6 +11,7 @@
 
 #include "base/error.h"
 #include "base/first_exception.h"
+#include "base/give_back.h"
 #include "base/grid.h"
 #include "precompute/checksums.h"
 #include "precompute/hilbert.h"
@@ -278,8 +279,8 @@ void LevelBuilder::addDepths(int pass, int slab, std::span<const uint16_t> codes
     if (weighted()) weights = weightsOf(whole, level);
     storeDepths(pass, level, 0, next, depths);
   }
-  tapped_[size_t(pass)] = {};
-  topDepths_[size_t(pass)] = {};
+  giveBack(tapped_[size_t(pass)]);
+  giveBack(topDepths_[size_t(pass)]);
 }
 
 void LevelBuilder::storeMatter(int level, int firstPlane, const MatterPlanes& matter) {
@@ -361,7 +362,7 @@ void LevelBuilder::writeLayer(size_t which, const std::vector<Brick>& bricks, La
     failure.guard([&] {
       frames[b] = packCodes(layer.planes[b], which == kMatter ? 2 : 1);
       entries_[bricks[b].entry].hash[which] = contentHash(frames[b]);
-      layer.planes[b] = {};
+      giveBack(layer.planes[b]);
     });
   }
   failure.rethrow();

@@ -375,9 +375,9 @@ uint64_t passBytes(const VolumeHeader& header, const PrecomputeOptions& options,
   const uint64_t brickVoxels = uint64_t(edge) * uint64_t(edge) * uint64_t(edge);
   const uint64_t window = planeVoxels * 2 * (uint64_t(edge) + 1);
   constexpr uint64_t kBytesPerBrick = 2 * (sizeof(StoredBrick) + sizeof(BrickEntry) + 32);  // lists that grow
-  // A slab's frames wait until all of them are packed.
+  // A slab's frames wait until all of them are packed, each in room for the largest, and are then joined.
   const uint64_t frames = options.layout == Layout::compact
-                              ? bricks * sizeof(FrameEntry) + slabBricks * largestFrame(passFaceBytes(edge))
+                              ? bricks * sizeof(FrameEntry) + 2 * slabBricks * largestFrame(passFaceBytes(edge))
                               : 0;
   const LevelBuilder::Shape shape = levelShape(header, options);
   // A brick of level 1 stands for up to eight.
