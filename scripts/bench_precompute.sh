@@ -22,7 +22,7 @@ By leaving parts out and by sampling, one thread, `noise` of 128^3, least of 60 
 64 bytes of one direction that are coded and stored together. Of 11.6 ms (`voxel`), 45 cycles of 3.3 GHz a line, storing runs takes 2.3 to
 2.6 ms, coding 1 to 2 ms, and state, terms and what is read ahead the rest, some 8 ms; about 2 of these are looking up terms and
 prefetching codes. `preintegrated` adds 9 ms for segments: five loads a voxel, two of them unaligned, of rows that take 56 kB for a
-tile of 256 voxels, more than the nearest cache holds; its division is not the limit (a vector of 16 every 2.5 cycles).
+tile of 256 voxels, more than the nearest cache holds.
 
 Streaming stores in this pattern alone take 11 cycles a line, in order or scattered, and memset 5.7: one thread cannot pass half of memset
 however little it computes. 0.35 of a memset of 35 GB/s by two threads leaves each 34 cycles a line.
