@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# The part of the VoxLink paper's evaluation that has surfaces (papers: sections 6.1 and 6.3, Tables 1 and 2, Figures 6
-# and 7), with the scenes of examples/scenes:
+# The part of the VoxLink paper's evaluation that has surfaces (papers: sections 5.2.1, 6.1 and 6.3, Tables 1 and 2,
+# Figures 5 to 7), with the scenes of examples/scenes:
 #   scripts/reproduce_voxlink_scenes.sh build/release/bin/freevoxel [OUT_FOLDER]
 # docs/results/voxlink is the default. Frame rates are means over VIEWS views of a full turn about y and as many of one
 # about x. Without a GPU the CPU backend traces few and small views; the tables say so.
-#   PARTS="table1 table2 steps figures" names what to measure and draw, all of it by default;
+#   PARTS="table1 table2 steps weights figures" names what to measure and draw, all of it by default;
 #   VIEWS=360 RESOLUTIONS="256 512 1024" SIZE=1000x1000 BACKEND=gl override what it chooses.
 . "$(dirname "$0")/voxlink_measuring.sh"
 out=${2:-$top/docs/results/voxlink}
@@ -16,7 +16,7 @@ printf 'x,y,z,radius\n0,0,0,1\n' >"$scratch/sphere.csv"
 turned="$machine, $size, mean of $((2 * views)) views of full turns about y and x, load average of $(nproc) cores at the
 start: $(load)"
 
-part() { [[ " ${PARTS:-table1 table2 steps figures} " == *" $1 "* ]]; }
+part() { [[ " ${PARTS:-table1 table2 steps weights figures} " == *" $1 "* ]]; }
 
 row() { # of the last trace: voxels, bricks, memory, bytes a voxel, frames and rays
   echo "$(value storedVoxels) $(value occupiedBricks) $(value bricks) $(value bufferBytes) \
@@ -99,6 +99,55 @@ steps() {
   } >"$out/scene_steps.md"
 }
 
+# Figure 5: voxel A splits a ray into one that meets B and one that meets C. The scene has one pixel; all colours are
+# black but one, so what the pixel shows is that one's weight.
+quad() { # FILE.ply CORNER EDGE EDGE
+  awk -v corner="$2" -v first="$3" -v second="$4" 'BEGIN {
+    split(corner, p); split(first, u); split(second, v)
+    print "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z"
+    print "element face 1\nproperty list uchar int vertex_indices\nend_header"
+    for (i = 0; i < 4; ++i) {
+      s = i == 1 || i == 2
+      t = i >= 2
+      print p[1] + s * u[1] + t * v[1], p[2] + s * u[2] + t * v[2], p[3] + s * u[3] + t * v[3]
+    }
+    print "4 0 1 2 3" }' >"$scratch/$1"
+}
+shineOnly() { # a|b|c|none: writes NAME.exr
+  local voxel colour materials=
+  for voxel in a b c; do
+    colour=$([[ $voxel == "$1" ]] && echo "[1, 1, 1]" || echo "[0, 0, 0]")
+    materials+="\"$voxel\": {\"color\": $colour"
+    [[ $voxel == a ]] && materials+=', "kind": "glass", "opacity": 0.5, "reflectance": 0.3, "indexOfRefraction": 1'
+    materials+="},"
+  done
+  cat >"$scratch/split.json" <<JSON
+{"meshes": [{"file": "a.ply", "material": "a"}, {"file": "b.ply", "material": "b"}, {"file": "c.ply", "material": "c"}],
+ "materials": {${materials%,}}}
+JSON
+  draw "$scratch/split.json" --resolution 40 --eye 0,0,20 --target 0,0,0 --fov 1 --size 1x1 -o "$scratch/$1.exr"
+}
+weights() {
+  local line voxel formula
+  quad a.ply "-2 -2 2" "4 0 -4" "0 4 0"
+  quad b.ply "-3 -3 -5" "6 0 0" "0 6 0"
+  quad c.ply "5 -3 3" "0 0 -6" "0 6 0"
+  shineOnly none
+  {
+    echo "Figure 5 of the paper: a ray is split in voxel A (alpha' = 0.5), 0.3 of what is left goes to C, the rest to B behind A."
+    echo
+    echo "| voxel | weight of its colour, traced | section 5.2.1 |"
+    echo "|---|---|---|"
+    for line in "a|alpha' = 0.5" "b|(1 - 0.3) (1 - alpha') = 0.35" "c|0.3 (1 - alpha') = 0.15"; do
+      IFS='|' read -r voxel formula <<<"$line"
+      shineOnly "$voxel"
+      "$program" compare "$scratch/$voxel.exr" "$scratch/none.exr" --json |
+        awk -v name="${voxel^^}" -v formula="$formula" \
+          '/"maxError"/ {printf "| %s | %.6f | %s |\n", name, $2 + 0, formula}'
+    done
+  } >"$out/figure5.md"
+}
+
 figures() {
   # Figure 6: the three scenes.
   for name in dragon glass_house glass_bunny; do
@@ -131,7 +180,7 @@ PLOT
   fi
 }
 
-for what in table1 table2 steps figures; do
+for what in table1 table2 steps weights figures; do
   if part "$what"; then "$what"; fi
 done
 echo "tables and figures: $out"
