@@ -306,6 +306,9 @@ SHARED_FUNCTION void clipRay(float base, float slope, float perSlope, float low,
   to = min(to, max(atLow, atHigh));
 }
 
+// Optical depth, in log2, that lets through 2^-12.
+SHARED_CONSTANT float kHiddenDepth = 12.0f;
+
 // `hiddenBelow`: a ray ends where less than this share of its light would reach the eye; 0 for never.
 SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay finestRay, CellLayout layout_, float hiddenBelow) {
   EXACT float red = 0.0f;
@@ -360,7 +363,10 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay finestRay, CellLayout l
         // Nothing lies before the first piece of the ray's way through the volume.
         open = eyeAbove ? to >= highest : from <= lowest;
       }
-      if (entered && arriving < hiddenBelow) break;
+      if (entered && arriving < hiddenBelow) {
+        hidden = true;
+        break;
+      }
       ++traced;
       TableValue halves[2];
       if (classified) {
@@ -412,6 +418,8 @@ SHARED_FUNCTION RaySums traceBlock(BLOCK_ACCESS PixelRay finestRay, CellLayout l
       if (seen) ++visible;
     }
   }
+  // Less than hiddenBelow reaches the eye from here: that much is before it, even if blocks in front leave a gap.
+  if (hidden) depth = depth + kHiddenDepth;
   RaySums sums;
   sums.red = red;
   sums.green = green;
