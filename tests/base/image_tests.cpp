@@ -143,7 +143,7 @@ void expectGracefulRead(const std::string& path, const std::string& what) {
 }
 
 /// Every byte, but under the sanitizers only some: there an exception out of OpenEXR takes a tenth of a second.
-constexpr size_t kDamageStep = kUnderAddressSanitizer ? 13 : 1;
+constexpr size_t kDamageStep = kUnderAddressSanitizer ? 31 : 1;
 
 class DamagedImage : public ::testing::TestWithParam<const char*> {
  protected:

@@ -4,6 +4,7 @@
 
 #include <random>
 
+#include "base/address_sanitizer.h"
 #include "base/error.h"
 #include "tests/support/test_data.h"
 #include "tests/volume/library_outcomes.h"
@@ -20,7 +21,7 @@ constexpr size_t kChanges = 5000;
 constexpr size_t kMostLengths = 1000000;
 #else
 constexpr size_t kChanges = 60;
-constexpr size_t kMostLengths = 1200;
+constexpr size_t kMostLengths = kUnderAddressSanitizer ? 400 : 1200;  // there each takes some 30 ms
 #endif
 
 /// Lengths to cut a file of `size` bytes to: all, or evenly spread with the last 40, and the whole one last.
