@@ -106,6 +106,7 @@ std::unique_ptr<gl::Context> chooseContext(Backend backend) {
 uint64_t hashOf(const TracedScene& scene) {
   std::vector<uint64_t> parts = {contentHash(std::as_bytes(std::span(scene.mesh.positions))),
                                  contentHash(std::as_bytes(std::span(scene.mesh.triangles))),
+                                 contentHash(std::as_bytes(std::span(scene.mesh.materialOfTriangle))),
                                  contentHash(std::as_bytes(std::span(scene.spheres.centres))),
                                  contentHash(std::as_bytes(std::span(scene.spheres.radii)))};
   for (const SceneVolume& volume : scene.volumes)

@@ -115,8 +115,7 @@ $(section detail)
 ## Cost over the size of the volume
 
 The same cloud at doubling resolutions, \`--lod 1\`, 256 x 256, median of 5, layout \`compact\`, every frame reading its bricks
-anew from the mapped file. The machine was shared when these and the tables of time around it were measured, under a lock
-against builds only: ratios within a table count, not milliseconds.
+anew from the mapped file. Ratios within a table count, not milliseconds.
 
 $(section volume-size)
 

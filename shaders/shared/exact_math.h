@@ -31,7 +31,7 @@ SHARED_FUNCTION float reciprocalRoot(float x) {
   return r2;
 }
 
-// Angles in radians, errors below 1e-6 (polynomials: Abramowitz and Stegun, 4.4.46 and 4.4.49).
+// Angles in radians, errors below 2e-6 (polynomials: Abramowitz and Stegun, 4.4.46 and 4.4.49).
 SHARED_FUNCTION float arcCosine(float x) {
   EXACT float size = min(x < 0.0f ? -x : x, 1.0f);
   EXACT float rest = 1.0f - size;
