@@ -91,7 +91,8 @@ class AttenuationFile {
   glm::ivec3 levelDims(int level) const;
   size_t levelBrickCount(int level) const;
   glm::ivec3 levelBrickOrigin(int level, size_t i) const;
-  BrickView levelBrick(int level, size_t i, DirectionSet directions = kAllDirections) const;
+  /// From level 1 on without its matter, unless `matter`.
+  BrickView levelBrick(int level, size_t i, DirectionSet directions = kAllDirections, bool matter = true) const;
   std::optional<size_t> findLevelBrick(int level, glm::ivec3 brickPosition) const;
   uint64_t levelBytes() const;  ///< that levels from 1 on take in the file, the directory left out
 

@@ -143,7 +143,7 @@ std::span<const std::byte> AttenuationFile::storedLevel(size_t which, const Leve
   return levelData_[which].subspan(size_t(entry.offset[which]), entry.bytes[which]);
 }
 
-BrickView AttenuationFile::levelBrick(int level, size_t i, DirectionSet directions) const {
+BrickView AttenuationFile::levelBrick(int level, size_t i, DirectionSet directions, bool matter) const {
   if (level == 0) return brick(i, directions);
   check(i < levelBrickCount(level), "brick number is in range");
   const size_t number = levelStarts_[size_t(level)] + i;
@@ -166,21 +166,23 @@ BrickView AttenuationFile::levelBrick(int level, size_t i, DirectionSet directio
                                  text(kSections[which]), *problem));
   };
   const size_t voxels = size_t(brickVoxels());
-  const size_t matterBytes = kMatterPlanes * voxels * sizeof(uint16_t);
+  const size_t matterBytes = matter ? kMatterPlanes * voxels * sizeof(uint16_t) : 0;
   const auto ofPass = [&](int pass) {
     constexpr DirectionSet kOfPass = (DirectionSet(1) << kDirectionsPerSection) - 1;
     return (directions >> (pass * kDirectionsPerSection) & kOfPass) != 0;
   };
   const size_t passes = (ofPass(0) ? 1u : 0u) + (ofPass(1) ? 1u : 0u);
   view.unpacked = std::make_unique_for_overwrite<std::byte[]>(matterBytes + passes * kDirectionsPerSection * voxels);
-  expectSound(unpackCodes(storedLevel(0, entry), 2, {view.unpacked.get(), matterBytes}), 0);
-  const auto* matter = reinterpret_cast<const uint16_t*>(view.unpacked.get());
-  for (size_t plane = 0; plane < kMatterPlanes; ++plane)
-    view.matter[plane] = matter + plane * voxels;
-  // Negative, infinite or no number: none is an extinction.
-  const uint16_t* extinction = view.matter[kMatterPlanes - 1];
-  if (const uint16_t largest = *std::max_element(extinction, extinction + voxels); largest >= kHalfInfinity) {
-    expectSound(fmt::format("expected extinctions below 0x{:04x}, found 0x{:04x}", kHalfInfinity, largest), 0);
+  if (matter) {
+    expectSound(unpackCodes(storedLevel(0, entry), 2, {view.unpacked.get(), matterBytes}), 0);
+    const auto* planes = reinterpret_cast<const uint16_t*>(view.unpacked.get());
+    for (size_t plane = 0; plane < kMatterPlanes; ++plane)
+      view.matter[plane] = planes + plane * voxels;
+    // Negative, infinite or no number: none is an extinction.
+    const uint16_t* extinction = view.matter[kMatterPlanes - 1];
+    if (const uint16_t largest = *std::max_element(extinction, extinction + voxels); largest >= kHalfInfinity) {
+      expectSound(fmt::format("expected extinctions below 0x{:04x}, found 0x{:04x}", kHalfInfinity, largest), 0);
+    }
   }
   std::byte* planes = view.unpacked.get() + matterBytes;
   for (int pass = 0; pass < 2; ++pass) {

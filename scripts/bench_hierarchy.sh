@@ -87,8 +87,10 @@ Written by \`scripts/bench_hierarchy.sh\`. PSNR in dB (peak 1, linear, covered p
 ## What coarser levels are worth
 
 Level k, a pixel to the longest edge of its voxels, one ray per pixel, against the finest level at 2^k times the size,
-averaged over 2^k x 2^k pixels. Pooled over 4 random orthographic views, in brackets the worst. The third row of each volume
-is the finest level drawn with one ray per pixel of the small picture: what sampling alone costs. Attenuation as by default.
+averaged over 2^k x 2^k pixels. Pooled over 4 random orthographic views, in brackets the worst. "Mean values": a volume of
+half, a quarter and an eighth of the resolution, each value a mean of eight, classified after interpolation, as levels of
+detail are made elsewhere; attenuation swept. "The finest": drawn with one ray per pixel of the small picture, which is what
+sampling alone costs. Else attenuation as by default.
 
 $(section levels)
 
@@ -114,8 +116,9 @@ $(section detail)
 
 ## Cost over the size of the volume
 
-The same cloud at doubling resolutions, \`--lod 1\`, 256 x 256, median of 5, layout \`compact\`, every frame reading its bricks
-anew from the mapped file. Ratios within a table count, not milliseconds.
+The same cloud at doubling resolutions, \`--lod 1\`, 256 x 256, median of 5, layout \`compact\`. Values, colours and opacities
+of bricks stay in memory from frame to frame; attenuation is unpacked and looked up anew in every frame, as for a view that
+moves. Ratios within a table count, not milliseconds.
 
 $(section volume-size)
 

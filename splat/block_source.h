@@ -6,6 +6,7 @@
 #include <span>
 #include <vector>
 
+#include "shaders/shared/cell_segment.h"
 #include "splat/classification_table.h"
 #include "splat/light_grid.h"
 #include "splat/visible_blocks.h"
@@ -25,8 +26,10 @@ inline constexpr int kLargestBlockEdge = 61;
 /// A block's voxels with an apron, clamped at the volume's border: blockVoxels(edge) each, x fastest, from origin - 1
 /// on.
 struct BlockSamples {
-  std::vector<uint16_t> codes;         ///< at level 0, else empty
-  std::vector<TableEntry> matter;      ///< from level 1 on, else empty: colour times extinction, extinction
+  std::vector<uint16_t> codes;  ///< at level 0, else empty
+  // From level 1 on, else empty: for kernels colour times extinction and extinction, for cells what they interpolate.
+  std::vector<TableEntry> matter;
+  std::vector<shared::CoverValue> cover;
   std::vector<uint16_t> attenuations;  ///< towards the eye, of AttenuationGrid::kUnit
   std::vector<LightValue> lights;      ///< empty: unlit
 };

@@ -93,7 +93,7 @@ class CpuCellCanvas final : public CellCanvas {
     for (size_t i = 0; i < samples.attenuations.size(); ++i)
       prepared.attenuations[i] = float(samples.attenuations[i]) * (1.0f / AttenuationGrid::kUnit);
     prepared.reader = {prepared.places.data(), prepared.attenuations.data(), samples.lights.data(),
-                       ready.cover.data(),     frame.table->integral.data(), frame.table->density.data()};
+                       samples.cover.data(),   frame.table->integral.data(), frame.table->density.data()};
   }
 
   void drawBatch(const CellFrame& frame, CellCounts& counts) {
@@ -154,9 +154,9 @@ std::unique_ptr<CellCanvas> makeCpuCellCanvas(glm::ivec2 imageSize, size_t block
 }
 
 uint64_t cpuCanvasBytes(int edge) {
-  // Codes and attenuation, also as floats; matter, also as cover; light.
-  return blockVoxels(edge) * (2 * sizeof(uint16_t) + 2 * sizeof(float) + sizeof(TableEntry) +
-                              sizeof(shared::CoverValue) + sizeof(LightValue));
+  // Codes and attenuation, also as floats; cover; light.
+  return blockVoxels(edge) *
+         (2 * sizeof(uint16_t) + 2 * sizeof(float) + sizeof(shared::CoverValue) + sizeof(LightValue));
 }
 
 }  // namespace freevoxel

@@ -40,7 +40,7 @@ struct BatchBytes {
     bounds += sizeof(PixelBounds);
     samples += voxels * sizeof(uint32_t);
     if (frame.source->lit()) lights += voxels * sizeof(LightValue);
-    if (block.level > 0) matter += voxels * sizeof(TableEntry);
+    if (block.level > 0) matter += voxels * sizeof(shared::CoverValue);
   }
   size_t total() const {
     return alignedUp(layouts) + alignedUp(bounds) + alignedUp(samples) + alignedUp(lights) + alignedUp(matter);
@@ -157,7 +157,7 @@ class GlCellCanvas final : public CellCanvas {
     std::vector<size_t> matterStarts;
     for (const ReadyBlock& ready : ready_) {
       if (!ready.drawn) continue;
-      matterStarts.push_back(bytes.matter / sizeof(TableEntry));
+      matterStarts.push_back(bytes.matter / sizeof(shared::CoverValue));
       bytes.add(frame, ready.block);
       shown.push_back(&ready);
       bounds.push_back(ready.bounds);
@@ -200,7 +200,7 @@ class GlCellCanvas final : public CellCanvas {
     });
     put(kMatterBinding, bytes.matter, [&](size_t offset) {
       for (size_t i = 0; i < shown.size(); ++i)
-        slot.buffer.write(offset + matterStarts[i] * sizeof(TableEntry), bytesOf(shown[i]->cover));
+        slot.buffer.write(offset + matterStarts[i] * sizeof(shared::CoverValue), bytesOf(shown[i]->samples.cover));
     });
     slot.buffer.write(at, bytesOf(bounds));
 

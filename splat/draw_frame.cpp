@@ -92,13 +92,26 @@ CellFrame cellFrame(const FrameDrawing& frame, const std::vector<PixelRay>& rays
   return cells;
 }
 
+CellCanvas& cellCanvas(const FrameDrawing& frame) {
+  KeptCanvas& kept = *frame.canvas;
+  const uint64_t glBytes = frame.context != nullptr ? allowedGlBytes(*frame.options) : 0;
+  if (kept.canvas && kept.imageSize == frame.camera->imageSize && kept.blocksAtATime == frame.blocksAtATime &&
+      kept.glBytes == glBytes) {
+    return *kept.canvas;
+  }
+  kept.canvas.reset();
+  kept.imageSize = frame.camera->imageSize;
+  kept.blocksAtATime = frame.blocksAtATime;
+  kept.glBytes = glBytes;
+  kept.canvas = frame.context != nullptr ? makeGlCellCanvas(*frame.context, kept.imageSize, kept.blocksAtATime, glBytes)
+                                         : makeCpuCellCanvas(kept.imageSize, kept.blocksAtATime);
+  return *kept.canvas;
+}
+
 Image drawCells(const FrameDrawing& frame, std::span<const VisibleBlock> blocks, float quantum,
                 SplatStatistics& statistics, Progress& progress) {
   const Clock::time_point setupStart = Clock::now();
-  const std::unique_ptr<CellCanvas> canvas = frame.context != nullptr
-                                                 ? makeGlCellCanvas(*frame.context, frame.camera->imageSize,
-                                                                    frame.blocksAtATime, allowedGlBytes(*frame.options))
-                                                 : makeCpuCellCanvas(frame.camera->imageSize, frame.blocksAtATime);
+  CellCanvas& canvas = cellCanvas(frame);
   std::vector<PixelRay>& rays = *frame.rays;
   rays.resize(size_t(frame.camera->imageSize.x) * size_t(frame.camera->imageSize.y));
   pixelRays(*frame.placement, frame.source->dims(0), *frame.camera,
@@ -108,9 +121,9 @@ Image drawCells(const FrameDrawing& frame, std::span<const VisibleBlock> blocks,
   statistics.setupSeconds += secondsSince(setupStart);
   const Clock::time_point drawStart = Clock::now();
   CellCounts counts;
-  canvas->clear();
-  canvas->draw(cells, blocks, counts);
-  Image sums = canvas->wholeQuanta();
+  canvas.clear();
+  canvas.draw(cells, blocks, counts);
+  Image sums = canvas.wholeQuanta();
   statistics.blocks += counts.blocks;
   statistics.splats += counts.blocks;
   for (size_t level = 0; level < counts.blocksOfLevel.size(); ++level) {
@@ -130,6 +143,7 @@ Image drawCells(const FrameDrawing& frame, std::span<const VisibleBlock> blocks,
 Image drawKernels(const FrameDrawing& frame, std::span<const VisibleBlock> blocks, float quantum,
                   SplatStatistics& statistics, Progress& progress) {
   const SplatOptions& options = *frame.options;
+  frame.canvas->canvas.reset();
   const std::unique_ptr<KernelCanvas> canvas = frame.context != nullptr
                                                    ? makeGlKernelCanvas(*frame.context, frame.camera->imageSize)
                                                    : makeCpuKernelCanvas(frame.camera->imageSize);
@@ -219,6 +233,9 @@ Image drawKernels(const FrameDrawing& frame, std::span<const VisibleBlock> block
 }
 
 }  // namespace
+
+KeptCanvas::KeptCanvas() = default;
+KeptCanvas::~KeptCanvas() = default;
 
 Image drawBlocks(const FrameDrawing& frame, std::span<const VisibleBlock> blocks, float quantum,
                  SplatStatistics& statistics, Progress& progress) {

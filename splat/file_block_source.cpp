@@ -11,6 +11,7 @@
 #include "base/grid.h"
 #include "precompute/hilbert.h"
 #include "precompute/stored_bricks.h"
+#include "splat/cover_values.h"
 #include "splat/grid_block_source.h"
 
 namespace freevoxel {
@@ -34,9 +35,10 @@ float fromHalf(uint16_t bits) {
 
 }  // namespace
 
-FileBlockSource::FileBlockSource(const AttenuationFile& file, View view, std::optional<AbsentBricks>& absent, int edge,
-                                 uint64_t memoryBytes)
-    : file_(file), view_(std::move(view)), absent_(absent), edge_(edge), memoryBytes_(memoryBytes) {
+FileBlockSource::FileBlockSource(const AttenuationFile& file, View view, std::optional<AbsentBricks>& absent,
+                                 HeldBricks& bricks, int edge, uint64_t memoryBytes)
+    : file_(file), view_(std::move(view)), absent_(absent), bricks_(bricks), edge_(edge), memoryBytes_(memoryBytes) {
+  bricks_.beginFrame();
   checkEqual(view_.lamps.size(), view_.lighting == nullptr ? 0 : view_.lighting->lighting().lights.size(),
              "lamps and what lies before them");
   for (int level = 0; level < file.levels(); ++level) {
@@ -55,7 +57,7 @@ uint64_t FileBlockSource::bytesPerBlock(int edge, int brickEdge, bool lit, bool 
   const uint64_t around = shaded ? bricks + 2 : bricks;
   const auto voxels = uint64_t(brickEdge) * uint64_t(brickEdge) * uint64_t(brickEdge);
   return voxels * (bricks * bricks * bricks * (sizeof(uint16_t) + (lit ? sizeof(LightValue) : 0)) +
-                   around * around * around * sizeof(TableEntry));
+                   around * around * around * (sizeof(TableEntry) + (shaded ? sizeof(shared::CoverValue) : 0)));
 }
 
 std::vector<VisibleBlock> FileBlockSource::storedBlocks(const AttenuationFile& file, int level, int edge) {
@@ -99,10 +101,10 @@ uint64_t FileBlockSource::key(const Place& place) {
          part(place.level, 3 * kPositionBits);
 }
 
-const FileBlockSource::Brick& FileBlockSource::brick(const Place& place) const {
-  const auto found = bricks_.find(key(place));
-  check(found != bricks_.end(), "bricks of a block are ready");
-  return found->second;
+const HeldBrick& FileBlockSource::brick(const Place& place) const {
+  const HeldBrick* found = bricks_.find(key(place));
+  check(found != nullptr, "bricks of a block are ready");
+  return *found;
 }
 
 std::vector<FileBlockSource::Place> FileBlockSource::bricksOf(std::span<const VisibleBlock> blocks) const {
@@ -147,67 +149,57 @@ std::vector<FileBlockSource::Place> FileBlockSource::withNeighbours(const std::v
 }
 
 void FileBlockSource::prepare(std::span<const VisibleBlock> blocks) {
-  ++call_;
+  bricks_.nextCall();
   const std::vector<Place> needed = bricksOf(blocks);
   const bool shaded = lit() && view_.lighting->shaded();
   const std::vector<Place> valued = shaded ? withNeighbours(needed) : needed;
-  std::vector<std::pair<Place, Brick*>> withoutValues, withoutAttenuation;
+  std::vector<std::pair<Place, HeldBrick*>> withoutValues, notViewed;
   std::vector<glm::ivec3> finest;
   for (const Place& place : valued) {
-    Brick& brick = bricks_[key(place)];
-    brick.lastUsed = call_;
-    if (brick.codes.empty() && brick.matter.empty()) {
+    HeldBrick& brick = bricks_.use(key(place));
+    if (!hasValues(place, brick)) {
       withoutValues.emplace_back(place, &brick);
       if (place.level == 0) finest.push_back(place.position);
     }
   }
   for (const Place& place : needed) {
-    Brick& brick = bricks_[key(place)];
-    if (!brick.complete()) withoutAttenuation.emplace_back(place, &brick);
+    HeldBrick& brick = bricks_.use(key(place));
+    if (brick.viewedIn != bricks_.frame()) notViewed.emplace_back(place, &brick);
   }
-  for (const auto& [place, brick] : withoutAttenuation) {
+  for (const auto& [place, brick] : notViewed) {
     if (const auto stored = file_.findLevelBrick(place.level, place.position)) file_.prefetch(place.level, *stored);
   }
   if (!finest.empty() && !absent_) absent_.emplace(file_);
   if (!finest.empty()) absent_->read(finest);
   FirstException failure;
   // In two rounds, since shading looks at neighbours' values.
-  const auto readAll = [&](const std::vector<std::pair<Place, Brick*>>& bricks, auto read) {
+  const auto readAll = [&](const std::vector<std::pair<Place, HeldBrick*>>& bricks, auto read) {
 #pragma omp parallel for schedule(dynamic, 1)
     for (int64_t i = 0; i < int64_t(bricks.size()); ++i)
       failure.guard([&] { (this->*read)(bricks[size_t(i)].first, *bricks[size_t(i)].second); });
     failure.rethrow();
   };
-  for (const auto& [place, brick] : withoutValues)
-    held_ -= brick->bytes();
-  readAll(withoutValues, &FileBlockSource::readValues);
-  for (const auto& [place, brick] : withoutValues)
-    held_ += brick->bytes();
-  for (const auto& [place, brick] : withoutAttenuation)
-    held_ -= brick->bytes();
-  readAll(withoutAttenuation, &FileBlockSource::readAttenuation);
-  for (const auto& [place, brick] : withoutAttenuation)
-    held_ += brick->bytes();
-  mostHeld_ = std::max(mostHeld_, held_);
-  file_.checkIntact();
-  forget();
+  try {
+    readAll(withoutValues, &FileBlockSource::readValues);
+    readAll(notViewed, &FileBlockSource::readAttenuation);
+    file_.checkIntact();
+  } catch (...) {
+    bricks_.clear();  // some may be half read
+    throw;
+  }
+  for (const auto& [place, brick] : notViewed)
+    brick->viewedIn = bricks_.frame();
+  bricks_.count();
+  mostHeld_ = std::max(mostHeld_, bricks_.bytes());
+  bricks_.forget(memoryBytes_);
 }
 
-void FileBlockSource::forget() {
-  if (held_ <= memoryBytes_) return;
-  std::vector<std::pair<uint64_t, uint64_t>> old;  // when last used, and which
-  for (const auto& [number, brick] : bricks_) {
-    if (brick.lastUsed != call_) old.emplace_back(brick.lastUsed, number);
-  }
-  std::sort(old.begin(), old.end());
-  for (const auto& [used, number] : old) {
-    if (held_ <= memoryBytes_) return;
-    held_ -= bricks_[number].bytes();
-    bricks_.erase(number);
-  }
+bool FileBlockSource::hasValues(const Place& place, const HeldBrick& brick) const {
+  if (place.level == 0) return !brick.codes.empty();
+  return (!matter() || !brick.matter.empty()) && (!cover() || !brick.cover.empty());
 }
 
-void FileBlockSource::readValues(const Place& place, Brick& brick) const {
+void FileBlockSource::readValues(const Place& place, HeldBrick& brick) const {
   const auto stored = file_.findLevelBrick(place.level, place.position);
   if (place.level == 0) {
     if (!stored) {
@@ -222,23 +214,26 @@ void FileBlockSource::readValues(const Place& place, Brick& brick) const {
     }
     return;
   }
-  brick.matter.assign(brickVoxels(), TableEntry{0.0f, 0.0f, 0.0f, 0.0f});
-  if (!stored) return;
-  const BrickView view = file_.levelBrick(place.level, *stored, DirectionSet(0));
-  for (size_t i = 0; i < brick.matter.size(); ++i) {
-    const size_t step = view.steps[i];
-    const float extinction = fromHalf(view.matter[3][step]);
-    if (view_.white) {
-      brick.matter[i] = {extinction, extinction, extinction, extinction};
-      continue;
+  std::vector<TableEntry> read(brickVoxels(), TableEntry{0.0f, 0.0f, 0.0f, 0.0f});
+  if (stored) {
+    const BrickView view = file_.levelBrick(place.level, *stored, DirectionSet(0));
+    for (size_t i = 0; i < read.size(); ++i) {
+      const size_t step = view.steps[i];
+      const float extinction = fromHalf(view.matter[3][step]);
+      if (view_.white) {
+        read[i] = {extinction, extinction, extinction, extinction};
+        continue;
+      }
+      const float perUnit = extinction * (1.0f / 65535.0f);
+      read[i] = {float(view.matter[0][step]) * perUnit, float(view.matter[1][step]) * perUnit,
+                 float(view.matter[2][step]) * perUnit, extinction};
     }
-    const float perUnit = extinction * (1.0f / 65535.0f);
-    brick.matter[i] = {float(view.matter[0][step]) * perUnit, float(view.matter[1][step]) * perUnit,
-                       float(view.matter[2][step]) * perUnit, extinction};
   }
+  if (cover()) coverOf(place.level, read, brick.cover);
+  if (matter()) brick.matter = std::move(read);
 }
 
-void FileBlockSource::readAttenuation(const Place& place, Brick& brick) const {
+void FileBlockSource::readAttenuation(const Place& place, HeldBrick& brick) const {
   const int edge = file_.brickEdge();
   const glm::ivec3 origin = place.position * edge;
   const Level& level = levels_[size_t(place.level)];
@@ -250,7 +245,7 @@ void FileBlockSource::readAttenuation(const Place& place, Brick& brick) const {
     for (const auto& lamp : level.lamps) {
       if (lamp) directions |= lamp->directions(origin);
     }
-    view.emplace(file_.levelBrick(place.level, *stored, directions));
+    view.emplace(file_.levelBrick(place.level, *stored, directions, false));
     std::vector<float> looked(brickVoxels());
     level.eye.look(*view, looked);
     for (size_t i = 0; i < looked.size(); ++i)
@@ -260,7 +255,7 @@ void FileBlockSource::readAttenuation(const Place& place, Brick& brick) const {
   if (lit()) lightBrick(place, view ? &*view : nullptr, brick);
 }
 
-void FileBlockSource::lightBrick(const Place& place, const BrickView* view, Brick& brick) const {
+void FileBlockSource::lightBrick(const Place& place, const BrickView* view, HeldBrick& brick) const {
   const int edge = file_.brickEdge();
   const size_t voxels = brickVoxels();
   brick.lights.assign(voxels, LightValue{0, 0, 0, 0});
@@ -297,20 +292,19 @@ void FileBlockSource::lightBrick(const Place& place, const BrickView* view, Bric
   view_.lighting->light(places, slopes, passed, brick.lights);
 }
 
-std::vector<glm::vec3> FileBlockSource::gradients(const Place& place, const Brick& own) const {
+std::vector<glm::vec3> FileBlockSource::gradients(const Place& place, const HeldBrick& own) const {
   const int edge = file_.brickEdge();
   const glm::ivec3 origin = place.position * edge, last = dims(place.level) - 1;
   // The bricks on either side of this one.
-  const Brick* beside[3][2] = {};
+  const HeldBrick* beside[3][2] = {};
   for (int axis = 0; axis < 3; ++axis) {
     for (int side = 0; side < 2; ++side) {
       Place next = place;
       next.position[axis] += 2 * side - 1;
-      const auto found = bricks_.find(key(next));
-      if (next.position[axis] >= 0 && found != bricks_.end()) beside[axis][side] = &found->second;
+      if (next.position[axis] >= 0) beside[axis][side] = bricks_.find(key(next));
     }
   }
-  const auto value = [&](const Brick& brick, glm::ivec3 local) {
+  const auto value = [&](const HeldBrick& brick, glm::ivec3 local) {
     const uint64_t i = linearIndex(local, glm::ivec3(edge));
     return place.level == 0 ? float(brick.codes[i]) : std::min(brick.matter[i].extinction, kOpaqueExtinction);
   };
@@ -330,7 +324,7 @@ std::vector<glm::vec3> FileBlockSource::gradients(const Place& place, const Bric
       const auto at = [&](int position) {
         glm::ivec3 there = local;
         there[axis] = position - origin[axis];
-        const Brick* brick = &own;
+        const HeldBrick* brick = &own;
         if (there[axis] < 0) brick = beside[axis][0];
         if (there[axis] >= edge) brick = beside[axis][1];
         there[axis] = (there[axis] + edge) % edge;
@@ -350,35 +344,44 @@ void FileBlockSource::gather(const VisibleBlock& block, BlockSamples& samples) c
   const glm::ivec3 low = glm::clamp(block.origin - 1, glm::ivec3(0), last) / edge;
   const glm::ivec3 high = glm::clamp(block.origin + edge_ + 1, glm::ivec3(0), last) / edge;
   const glm::ivec3 count = high - low + 1;
-  std::vector<const Brick*> bricks(voxelCount(count));
+  std::vector<const HeldBrick*> bricks(voxelCount(count));
   for (size_t i = 0; i < bricks.size(); ++i) {
     const glm::ivec3 at(int(i) % count.x, int(i) / count.x % count.y, int(i) / (count.x * count.y));
     bricks[i] = &brick({block.level, low + at});
   }
   const size_t voxels = blockVoxels(edge_);
   samples.codes.resize(block.level == 0 ? voxels : 0);
-  samples.matter.resize(block.level == 0 ? 0 : voxels);
+  samples.matter.resize(block.level == 0 || cover() ? 0 : voxels);
+  samples.cover.resize(block.level == 0 || !cover() ? 0 : voxels);
   samples.attenuations.resize(voxels);
   samples.lights.resize(lit() ? voxels : 0);
+  // Rows in runs that lie in one brick; places beyond the volume take the outermost voxel.
+  const auto copyRow = [&](auto member, auto* out, size_t rowBricks, size_t row) {
+    for (int x = 0; x < side;) {
+      const int px = std::clamp(block.origin.x - 1 + x, 0, last.x);
+      const auto* from = (bricks[rowBricks + size_t((px >> shift) - low.x)]->*member).data() + row + size_t(px & mask);
+      const bool beyond = block.origin.x - 1 + x != px;
+      const int run = beyond ? 1 : std::min({side - x, edge - (px & mask), last.x - px + 1});
+      std::copy_n(from, run, out + x);
+      x += run;
+    }
+  };
   size_t to = 0;
   for (int z = 0; z < side; ++z) {
     const int pz = std::clamp(block.origin.z - 1 + z, 0, last.z);
-    for (int y = 0; y < side; ++y) {
+    for (int y = 0; y < side; ++y, to += size_t(side)) {
       const int py = std::clamp(block.origin.y - 1 + y, 0, last.y);
       const size_t rowBricks = size_t(count.x) * size_t(((py >> shift) - low.y) + count.y * ((pz >> shift) - low.z));
       const size_t row = size_t(edge) * size_t((py & mask) + edge * (pz & mask));
-      for (int x = 0; x < side; ++x, ++to) {
-        const int px = std::clamp(block.origin.x - 1 + x, 0, last.x);
-        const Brick& from = *bricks[rowBricks + size_t((px >> shift) - low.x)];
-        const size_t at = row + size_t(px & mask);
-        samples.attenuations[to] = from.attenuations[at];
-        if (block.level == 0) {
-          samples.codes[to] = from.codes[at];
-        } else {
-          samples.matter[to] = from.matter[at];
-        }
-        if (lit()) samples.lights[to] = from.lights[at];
+      copyRow(&HeldBrick::attenuations, samples.attenuations.data() + to, rowBricks, row);
+      if (block.level == 0) {
+        copyRow(&HeldBrick::codes, samples.codes.data() + to, rowBricks, row);
+      } else if (cover()) {
+        copyRow(&HeldBrick::cover, samples.cover.data() + to, rowBricks, row);
+      } else {
+        copyRow(&HeldBrick::matter, samples.matter.data() + to, rowBricks, row);
       }
+      if (lit()) copyRow(&HeldBrick::lights, samples.lights.data() + to, rowBricks, row);
     }
   }
   AttenuationGrid faces;

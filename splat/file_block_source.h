@@ -5,12 +5,12 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include "hierarchy/absent_bricks.h"
 #include "splat/block_source.h"
 #include "splat/coarse_volume.h"
+#include "splat/held_bricks.h"
 #include "splat/stored_attenuation.h"
 #include "splat/voxel_lighting.h"
 
@@ -38,12 +38,14 @@ class FileBlockSource final : public BlockSource {
     const VoxelLighting* lighting = nullptr;  ///< null: unlit
     std::vector<LampSource> lamps;            ///< one per lamp of `lighting`
     bool white = false;                       ///< levels from 1 on are drawn without their colours
+    bool cells = true;                        ///< whether cells or kernels are drawn
   };
 
-  /// All must outlive the source. `absent`: of the same file, made when it is first needed. `memoryBytes`: that bricks
-  /// may take in memory; what one call of prepare() needs is held in any case.
-  FileBlockSource(const AttenuationFile& file, View view, std::optional<AbsentBricks>& absent, int edge,
-                  uint64_t memoryBytes);
+  /// All must outlive the source. Begins a frame. `absent`, made when it is first needed, and `bricks`, whose other
+  /// frames were of the same `white`: of the same file, for one source at a time. `memoryBytes`: that bricks may take
+  /// in memory; what one call of prepare() needs is held in any case.
+  FileBlockSource(const AttenuationFile& file, View view, std::optional<AbsentBricks>& absent, HeldBricks& bricks,
+                  int edge, uint64_t memoryBytes);
 
   int edge() const override { return edge_; }
   glm::ivec3 dims(int level) const override { return file_.levelDims(level); }
@@ -58,19 +60,6 @@ class FileBlockSource final : public BlockSource {
   static std::vector<VisibleBlock> storedBlocks(const AttenuationFile& file, int level, int edge);
 
  private:
-  /// A brick's voxels, x fastest; those outside the volume hold anything.
-  struct Brick {
-    std::vector<uint16_t> codes;
-    std::vector<TableEntry> matter;
-    std::vector<uint16_t> attenuations;
-    std::vector<LightValue> lights;
-    uint64_t lastUsed = 0;
-    bool complete() const { return !attenuations.empty(); }
-    uint64_t bytes() const {
-      return codes.size() * sizeof(codes[0]) + matter.size() * sizeof(matter[0]) +
-             attenuations.size() * sizeof(attenuations[0]) + lights.size() * sizeof(lights[0]);
-    }
-  };
   struct Place {
     int level;
     glm::ivec3 position;  ///< origin / brick edge
@@ -82,16 +71,19 @@ class FileBlockSource final : public BlockSource {
   };
 
   static uint64_t key(const Place& place);
-  const Brick& brick(const Place& place) const;
+  const HeldBrick& brick(const Place& place) const;
   std::vector<Place> bricksOf(std::span<const VisibleBlock> blocks) const;
   std::vector<Place> withNeighbours(const std::vector<Place>& places) const;
-  /// Codes or matter.
-  void readValues(const Place& place, Brick& brick) const;
+  /// Of levels from 1 on: what is looked at.
+  bool cover() const { return view_.cells; }
+  bool matter() const { return !view_.cells || (lit() && view_.lighting->shaded()); }
+  bool hasValues(const Place& place, const HeldBrick& brick) const;
+  /// Codes, or matter and cover.
+  void readValues(const Place& place, HeldBrick& brick) const;
   /// All else; the values of the brick and, if shaded, of the six around it are there.
-  void readAttenuation(const Place& place, Brick& brick) const;
-  void lightBrick(const Place& place, const BrickView* view, Brick& brick) const;
-  std::vector<glm::vec3> gradients(const Place& place, const Brick& brick) const;
-  void forget();
+  void readAttenuation(const Place& place, HeldBrick& brick) const;
+  void lightBrick(const Place& place, const BrickView* view, HeldBrick& brick) const;
+  std::vector<glm::vec3> gradients(const Place& place, const HeldBrick& brick) const;
   size_t brickVoxels() const {
     return size_t(file_.brickEdge()) * size_t(file_.brickEdge()) * size_t(file_.brickEdge());
   }
@@ -99,13 +91,11 @@ class FileBlockSource final : public BlockSource {
   const AttenuationFile& file_;
   View view_;
   std::optional<AbsentBricks>& absent_;
+  HeldBricks& bricks_;
   int edge_;
   uint64_t memoryBytes_;
   std::vector<Level> levels_;
-  std::unordered_map<uint64_t, Brick> bricks_;
-  uint64_t held_ = 0;      ///< bytes of bricks_
-  uint64_t mostHeld_ = 0;  ///< the most that was
-  uint64_t call_ = 0;      ///< of prepare()
+  uint64_t mostHeld_ = 0;  ///< the most that bricks took
 };
 
 }  // namespace freevoxel

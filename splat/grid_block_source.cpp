@@ -62,6 +62,7 @@ uint64_t GridBlockSource::volumeBytes() const {
 void GridBlockSource::gather(const VisibleBlock& block, BlockSamples& samples) const {
   checkEqual(block.level, 0, "level of a grid");
   samples.matter.clear();
+  samples.cover.clear();
   samples.codes.resize(blockVoxels(edge_));
   forEachVoxel(grid_.dims, block.origin, edge_,
                [&](uint64_t from, size_t to) { samples.codes[to] = grid_.codes[from]; });

@@ -5,7 +5,6 @@
 
 #include "base/first_exception.h"
 #include "base/grid.h"
-#include "shaders/shared/exact_math.h"
 #include "volume/code_visibility.h"
 
 namespace freevoxel {
@@ -55,13 +54,13 @@ CellBounds visibleCells(std::span<const uint16_t> codes, int side, const CodeVis
   return bounds;
 }
 
-CellBounds visibleCells(std::span<const TableEntry> matter, int side) {
+CellBounds visibleCells(std::span<const shared::CoverValue> cover, int side) {
   CellBounds bounds;
   size_t i = 0;
   for (int z = 0; z < side; ++z) {
     for (int y = 0; y < side; ++y) {
       for (int x = 0; x < side; ++x, ++i) {
-        if (matter[i].extinction <= 0.0f) continue;
+        if (cover[i].cover == 0.0f) continue;
         // A voxel is a corner of the cells on either side of it.
         bounds.add(glm::max(glm::ivec3(x, y, z) - 1, 0));
         bounds.add({x, y, z});
@@ -71,30 +70,12 @@ CellBounds visibleCells(std::span<const TableEntry> matter, int side) {
   return bounds;
 }
 
-/// What blocks of levels from 1 on are interpolated by.
-void coverOf(const VisibleBlock& block, std::span<const TableEntry> matter, std::vector<shared::CoverValue>& cover) {
-  const float length = shared::kCoverVoxels * float(1 << block.level);
-  cover.resize(matter.size());
-  for (size_t i = 0; i < matter.size(); ++i) {
-    const TableEntry& from = matter[i];
-    if (!(from.extinction > 0.0f)) {
-      cover[i] = {0.0f, 0.0f, 0.0f, 0.0f};
-      continue;
-    }
-    const float depth = from.extinction * length;
-    const float opacity = shared::absorbed(depth);
-    const float perExtinction = opacity / from.extinction;
-    cover[i] = {from.red * perExtinction, from.green * perExtinction, from.blue * perExtinction,
-                opacity > 0.5f ? -shared::transmitted(depth) : opacity};
-  }
-}
-
 }  // namespace
 
 bool shrinkToVisible(VisibleBlock& block, int edge, const BlockSamples& samples, const CodeVisibility& visibility) {
   const int side = blockSide(edge);
   CellBounds bounds =
-      block.level == 0 ? visibleCells(samples.codes, side, visibility) : visibleCells(samples.matter, side);
+      block.level == 0 ? visibleCells(samples.codes, side, visibility) : visibleCells(samples.cover, side);
   if (bounds.empty()) return false;
   // Cell n lies between voxels n and n + 1, and those of coarser levels less than half a voxel higher.
   bounds.low += block.origin - 1;
@@ -137,7 +118,6 @@ void readyBlocks(const CellFrame& frame, std::span<const VisibleBlock> blocks, s
         one.block.high = one.block.origin + edge;
         one.bounds = {glm::ivec2(0), frame.view->imageSize};
         one.drawn = true;
-        coverOf(one.block, one.samples.matter, one.cover);
         return;
       }
       if (!shrinkToVisible(one.block, edge, one.samples, *frame.visibility)) {
@@ -150,7 +130,6 @@ void readyBlocks(const CellFrame& frame, std::span<const VisibleBlock> blocks, s
       }
       one.bounds = pixelBounds(*frame.view, one.block);
       one.drawn = !one.bounds.empty();
-      if (one.drawn) coverOf(one.block, one.samples.matter, one.cover);
       if (!one.drawn) ++culled;
     });
   }

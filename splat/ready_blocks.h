@@ -13,8 +13,7 @@ struct ReadyBlock {
   VisibleBlock block;
   PixelBounds bounds;
   BlockSamples samples;
-  std::vector<shared::CoverValue> cover;  ///< of samples.matter, if the block is drawn
-  bool drawn = true;                      ///< false: nothing in it is visible, or it is hidden, or off the image
+  bool drawn = true;  ///< false: nothing in it is visible, or it is hidden, or off the image
 };
 
 /// The blocks that may reach the image; the others are counted as culled.

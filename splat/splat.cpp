@@ -94,8 +94,8 @@ std::string_view attenuationSourceName(AttenuationSource source) {
   throw InternalError("internal error: unknown source of attenuation");
 }
 
-/// That attenuation towards lamps may take between two frames.
-constexpr uint64_t kKeptLampBytes = uint64_t(1) << 30;
+/// That attenuation towards lamps, and bricks, may take between two frames, each.
+constexpr uint64_t kKeptBytes = uint64_t(1) << 30;
 
 struct Splatter::State {
   const AttenuationFile* file = nullptr;  ///< may be null
@@ -109,11 +109,13 @@ struct Splatter::State {
   ClassificationTable table;
   std::optional<CodeVisibility> visibility;
   std::unique_ptr<gl::Context> context;  ///< null: cpu
+  KeptCanvas canvas;
   // Made when first needed.
   std::optional<ValueGrid> own;
   std::optional<VisibleCubes> cubes;
   std::optional<CoarseVolume> coarse;
   std::optional<AbsentBricks> absent;             ///< bricks that the file lacks
+  HeldBricks bricks;                              ///< what of the file is in memory
   std::vector<std::vector<VisibleBlock>> levels;  ///< blocks of each level; at first of the finest only
 
   /// What of a frame does not depend on the quantum.
@@ -361,6 +363,7 @@ StoredTarget Splatter::State::storedTarget(Frame& to, const Towards& target, Att
 void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSource source) {
   const SplatOptions& options = to.options;
   FileBlockSource::View look;
+  look.cells = options.footprint == Footprint::cell;
   look.white = std::all_of(transfer.points.begin(), transfer.points.end(),
                            [](const TransferPoint& point) { return point.srgb == glm::dvec3(1.0); });
   if ((options.lodPixels > 0.0 || to.allLevels) && file->levels() > 1 && !look.white &&
@@ -405,7 +408,7 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
               FileBlockSource::bytesPerBlock(blockEdge, file->brickEdge(), look.lighting != nullptr,
                                              look.lighting != nullptr && look.lighting->shaded()),
               sourceBytes);
-  to.source = std::make_unique<FileBlockSource>(*file, std::move(look), absent, blockEdge, sourceBytes);
+  to.source = std::make_unique<FileBlockSource>(*file, std::move(look), absent, bricks, blockEdge, sourceBytes);
   if (options.lodPixels > 0.0) {
     findLevels();
     to.blocks = selectBlocks(levels, blockEdge, to.view, options.lodPixels);
@@ -426,6 +429,10 @@ void Splatter::prepareFrame(const Camera& camera, const SplatOptions& options, b
   State& state = *state_;
   state.frame.reset();
   ++state.frameNumber;
+  // Where memory is bounded, a frame's own needs come first.
+  state.bricks.nextCall();
+  state.bricks.forget(options.memoryBytes == 0 ? kKeptBytes : 0);
+  if (options.memoryBytes > 0 || options.gpuMemoryBytes > 0) state.canvas.canvas.reset();
   auto frame = std::make_unique<State::Frame>();
   frame->camera = camera;
   frame->options = options;
@@ -463,7 +470,7 @@ void Splatter::prepareFrame(const Camera& camera, const SplatOptions& options, b
   } else {
     state.lookIntoFile(*frame, eye, source);
   }
-  state.forgetLamps(options.memoryBytes == 0 ? kKeptLampBytes : 0);
+  state.forgetLamps(options.memoryBytes == 0 ? kKeptBytes : 0);
   statistics.attenuationSeconds = secondsSince(attenuationStart) - statistics.lightSeconds;
   state.frame = std::move(frame);
 }
@@ -512,6 +519,7 @@ Sums Splatter::drawFrameBlocks(std::span<const VisibleBlock> blocks, float quant
                     frame.statistics.attenuation == attenuationSourceName(AttenuationSource::pinned);
   drawing.blocksAtATime = frame.blocksAtATime;
   drawing.rays = &frame.rays;
+  drawing.canvas = &state.canvas;
   Sums sums;
   sums.image = drawBlocks(drawing, blocks, quantum, frame.statistics, progress);
   sums.quantum = quantum;

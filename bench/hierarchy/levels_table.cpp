@@ -7,8 +7,10 @@
 
 #include "base/compare.h"
 #include "base/error.h"
+#include "base/grid.h"
 #include "bench/fidelity/measured.h"
 #include "bench/hierarchy/tables.h"
+#include "hierarchy/value_grid.h"
 #include "precompute/precompute.h"
 #include "splat/splat.h"
 
@@ -45,6 +47,32 @@ Camera levelCamera(const Camera& from, const Placement& placement, const Box& bo
   return camera;
 }
 
+/// Every voxel the mean of the values of up to eight of `fine`: levels of detail without a hierarchy of what is seen.
+ValueGrid meanValues(const ValueGrid& fine) {
+  ValueGrid coarse;
+  coarse.dims = (fine.dims + 1) / 2;
+  coarse.placement = fine.placement;
+  coarse.placement.spacing *= 2.0;
+  coarse.placement.origin += fine.placement.direction * (0.5 * fine.placement.spacing);
+  coarse.coding = fine.coding;
+  coarse.codes.resize(voxelCount(coarse.dims));
+  for (int z = 0; z < coarse.dims.z; ++z) {
+    for (int y = 0; y < coarse.dims.y; ++y) {
+      for (int x = 0; x < coarse.dims.x; ++x) {
+        uint32_t sum = 0, count = 0;
+        for (int child = 0; child < 8; ++child) {
+          const glm::ivec3 p = 2 * glm::ivec3(x, y, z) + glm::ivec3(child & 1, child >> 1 & 1, child >> 2);
+          if (glm::any(glm::greaterThanEqual(p, fine.dims))) continue;
+          sum += fine.codes[linearIndex(p, fine.dims)];
+          ++count;
+        }
+        coarse.codes[linearIndex({x, y, z}, coarse.dims)] = uint16_t((sum + count / 2) / count);
+      }
+    }
+  }
+  return coarse;
+}
+
 /// Alpha alone, as a picture.
 Image alphaOf(Image image) {
   for (size_t i = 0; i < image.pixels.size(); i += 4)
@@ -52,8 +80,7 @@ Image alphaOf(Image image) {
   return image;
 }
 
-/// One row; the finest level by itself for comparison, with no more rays than a coarser one has, if no hierarchy is
-/// given.
+/// One row.
 struct Row {
   std::vector<Measured> ofLevel = std::vector<Measured>(kLevels), alphaOfLevel = std::vector<Measured>(kLevels);
 
@@ -92,7 +119,17 @@ void addLevels(Table& table, const Scene& scene, const TableOptions& options) {
                   "level 2", "level 3",   "alpha, level 1",
                   "2",       "3",         "bytes of levels per voxel"};
   }
-  Row finest;
+  Row finest, values;
+  // Extinction is per shortest edge, and stays what it is per length.
+  TransferFunction transfer = scene.transfer;
+  std::vector<ValueGrid> grids = {meanValues(scene.grid)};
+  while (grids.size() < kLevels)
+    grids.push_back(meanValues(grids.back()));
+  std::vector<Splatter> ofValues;
+  for (const ValueGrid& grid : grids) {
+    transfer.referenceLength *= 0.5;
+    ofValues.emplace_back(grid, nullptr, transfer, Backend::cpu);
+  }
   for (const Hierarchy hierarchy : {Hierarchy::geometric, Hierarchy::weighted}) {
     const AttenuationFile file = levelFile(scene, hierarchy, kLevels + 1, options.folders);
     Splatter splatter(file, scene.transfer, Backend::cpu);
@@ -112,14 +149,17 @@ void addLevels(Table& table, const Scene& scene, const TableOptions& options) {
         if (result.statistics.blocksOfLevel.size() != size_t(level) + 1)
           throw InternalError("internal error: another level was drawn");
         row.add(level, resolve(result.sums, Formula::normalised), reference);
-        if (hierarchy == Hierarchy::geometric)
-          finest.add(level, resolve(draw(coarse, 0.0).sums, Formula::normalised), reference);
+        if (hierarchy != Hierarchy::geometric) continue;
+        finest.add(level, resolve(draw(coarse, 0.0).sums, Formula::normalised), reference);
+        const SplatResult means = ofValues[size_t(level) - 1].render(coarse, {}, silentProgress());
+        values.add(level, resolve(means.sums, Formula::normalised), reference);
       }
     }
     row.addTo(table, scene.source.title, std::string(hierarchyName(hierarchy)),
               fmt::format("{:.3f}", double(file.levelBytes()) / double(voxelCount(file.dims()))));
     std::filesystem::remove(file.path());
   }
+  values.addTo(table, scene.source.title, "mean values, swept", "");
   finest.addTo(table, scene.source.title, "the finest, one ray per pixel", "");
 }
 

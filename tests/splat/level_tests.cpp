@@ -211,6 +211,38 @@ TEST(Levels, SameBitsWhateverTheOrderBackendAndMemory) {
   }
 }
 
+// A splatter keeps bricks and its canvas from frame to frame.
+TEST(Levels, FramesDoNotDependOnThoseBefore) {
+  const Scene scene = lumps();
+  SplatOptions coarse, kernel = kKernel, shaded, finest, swept, bounded;
+  coarse.lodPixels = kernel.lodPixels = shaded.lodPixels = bounded.lodPixels = 2.5;
+  shaded.lighting.ambient = 0.2f;
+  shaded.lighting.shading = Shading::phong;
+  shaded.lighting.lights = {{true, {1.0, 2.0, 1.0}, {1.0f, 0.8f, 0.5f}}};
+  for (SplatOptions* options : {&kernel, &shaded, &finest})
+    options->attenuation = options->lightAttenuation = AttenuationSource::interpolated;
+  swept.attenuation = AttenuationSource::swept;
+  bounded.memoryBytes = uint64_t(24) << 20;
+  bounded.gpuMemoryBytes = uint64_t(8) << 20;
+  for (const Backend backend : {Backend::cpu, Backend::gl}) {
+    std::vector<SplatResult> alone;
+    // Bricks are the same on both.
+    std::vector<SplatOptions> row = {coarse, shaded, kernel, coarse, bounded};
+    if (backend == Backend::cpu) row.insert(row.end(), {finest, swept, kernel, shaded, coarse});
+    const auto view = [&](size_t n) {
+      Camera camera = alongView(scene, n % 3 == 2 ? glm::ivec2(51, 64) : glm::ivec2(64, 47));
+      camera.eye.x += 3.0 * double(n % 4);
+      return camera;
+    };
+    for (size_t n = 0; n < row.size(); ++n)
+      alone.push_back(splatScene(scene, view(n), row[n], backend));
+    Splatter splatter(*scene.file, scene.transfer, backend);
+    for (size_t n = 0; n < row.size(); ++n)
+      EXPECT_TRUE(sameSums(splatter.render(view(n), row[n], silentProgress()), alone[n])) << n;
+    EXPECT_FALSE(sameSums(alone[0], alone[3]));
+  }
+}
+
 TEST(Levels, TooLittleMemoryIsAnError) {
   const Scene scene = lumps();
   const Camera camera = alongView(scene, {64, 47});

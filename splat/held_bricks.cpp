@@ -1,0 +1,45 @@
+#include "splat/held_bricks.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace freevoxel {
+
+HeldBrick& HeldBricks::use(uint64_t number) {
+  HeldBrick& brick = bricks_[number];
+  brick.lastUsed = call_;
+  return brick;
+}
+
+const HeldBrick* HeldBricks::find(uint64_t number) const {
+  const auto found = bricks_.find(number);
+  return found == bricks_.end() ? nullptr : &found->second;
+}
+
+void HeldBricks::count() {
+  bytes_ = 0;
+  for (const auto& [number, brick] : bricks_)
+    bytes_ += brick.bytes();
+}
+
+void HeldBricks::forget(uint64_t bytes) {
+  if (bytes_ <= bytes) return;
+  std::vector<std::pair<uint64_t, uint64_t>> old;  // when last used, and which
+  for (const auto& [number, brick] : bricks_) {
+    if (brick.lastUsed != call_) old.emplace_back(brick.lastUsed, number);
+  }
+  std::sort(old.begin(), old.end());
+  for (const auto& [used, number] : old) {
+    if (bytes_ <= bytes) return;
+    const auto found = bricks_.find(number);
+    bytes_ -= found->second.bytes();
+    bricks_.erase(found);
+  }
+}
+
+void HeldBricks::clear() {
+  bricks_.clear();
+  bytes_ = 0;
+}
+
+}  // namespace freevoxel
