@@ -65,13 +65,15 @@ void measure(int edge) {
       (kBrickPlaneAlignment - reinterpret_cast<uintptr_t>(memory.data()) % kBrickPlaneAlignment) % kBrickPlaneAlignment;
   PlanesInMemory sink(dims, first);
   StoredCodePlanes planes(grid.codes, dims);
+  SweepMemory sweepMemory;
   for (const auto classification : {Classification::preintegrated, Classification::voxel}) {
     Stage table, sweep, attenuation, open, towardsEye, setup, draw, resolved;
     for (int run = 0; run < kRuns; ++run) {
       const TransferFunction edited = transferOf(0.1 + 0.02 * run);
       std::unique_ptr<SegmentDepth> segments;
       const double tableSeconds = secondsOf([&] { segments = makeSegmentDepth(classification, edited, grid.coding); });
-      const double sweepSeconds = secondsOf([&] { sweepAttenuation(planes, dims, kBenchBrickEdge, *segments, sink); });
+      const double sweepSeconds =
+          secondsOf([&] { sweepAttenuation(planes, dims, kBenchBrickEdge, *segments, sink, 3, sweepMemory); });
       table.add(tableSeconds);
       sweep.add(sweepSeconds);
       attenuation.add(tableSeconds + sweepSeconds);

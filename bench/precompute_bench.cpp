@@ -114,10 +114,11 @@ void measure(int edge, const Field& field, Classification classification, int th
   std::vector<double> tables, sweeps, memsets, streams;
   PlanesInMemory sink(dims, buffer.memory.get());
   StoredCodePlanes planes(codes, dims);
+  SweepMemory memory;
   for (int run = 0; run < kRuns; ++run) {
     std::unique_ptr<SegmentDepth> segments;
     tables.push_back(secondsOf([&] { segments = makeSegmentDepth(classification, transfer, coding); }));
-    sweeps.push_back(secondsOf([&] { sweepAttenuation(planes, dims, kBenchBrickEdge, *segments, sink); }));
+    sweeps.push_back(secondsOf([&] { sweepAttenuation(planes, dims, kBenchBrickEdge, *segments, sink, 3, memory); }));
     memsets.push_back(buffer.gigabytesPerSecond(set));
     streams.push_back(buffer.gigabytesPerSecond(streamZeros));
   }

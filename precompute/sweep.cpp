@@ -14,7 +14,6 @@
 #include "base/grid.h"
 #include "precompute/stored_bricks.h"
 #include "precompute/sweep_kernels.h"
-#include "precompute/sweep_memory.h"
 #include "shaders/shared/directions.h"
 
 namespace freevoxel {
@@ -461,16 +460,23 @@ std::span<const uint16_t> StoredCodePlanes::planes(int /*pass*/, int first, int 
 }
 
 void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments, AttenuationSink& sink,
-                      unsigned passes) {
+                      unsigned passes, SweepMemory& memory) {
   const Shape shape(dims, edge);
-  SweepMemory memory(sweepMemory(shape, std::popcount(passes), omp_get_max_threads()));
+  memory.begin(sweepMemory(shape, std::popcount(passes), omp_get_max_threads()));
   sweepSlabs(codes, shape, segments, sink, passes, {0, shape.slabs(), {}, false}, memory);
+}
+
+void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments, AttenuationSink& sink,
+                      unsigned passes) {
+  SweepMemory memory;
+  sweepAttenuation(codes, dims, edge, segments, sink, passes, memory);
 }
 
 BorderDepths sweepPart(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments,
                        AttenuationSink& sink, unsigned passes, const SweepPart& part) {
   const Shape shape(dims, edge);
-  SweepMemory memory(sweepMemory(shape, std::popcount(passes), omp_get_max_threads()));
+  SweepMemory memory;
+  memory.begin(sweepMemory(shape, std::popcount(passes), omp_get_max_threads()));
   std::vector<SweepGroup> groups = sweepSlabs(codes, shape, segments, sink, passes, part, memory);
   BorderDepths outgoing;
   for (SweepGroup& group : groups) {

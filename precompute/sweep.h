@@ -10,6 +10,7 @@
 
 #include "precompute/level_tap.h"
 #include "precompute/segment_depth.h"
+#include "precompute/sweep_memory.h"
 #include "shaders/shared/directions.h"
 
 namespace freevoxel {
@@ -84,7 +85,11 @@ struct SweepPart {
 
 /// Sweeps the directions of the passes `passes` (bit 0, bit 1) over bricks of `edge` voxels; both at once if both are
 /// asked for. A voxel whose neighbour lies outside the volume has depth 0, A8 = 255.
-/// What the sink receives depends neither on the number of threads nor on the instruction set. Takes sweepBytes().
+/// What the sink receives depends neither on the number of threads nor on the instruction set. Takes sweepBytes() of
+/// `memory`, whose earlier use does not matter.
+void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments, AttenuationSink& sink,
+                      unsigned passes, SweepMemory& memory);
+/// With memory of its own.
 void sweepAttenuation(CodePlanes& codes, glm::ivec3 dims, int edge, const SegmentDepth& segments, AttenuationSink& sink,
                       unsigned passes = 3);
 

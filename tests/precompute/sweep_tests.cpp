@@ -126,6 +126,29 @@ TEST_P(Sweep, isTheSameForAnyNumberOfThreadsAndAnyInstructionSet) {
   omp_set_num_threads(before);
 }
 
+TEST(SweepMemoryKept, leavesNoTraceInLaterSweeps) {
+  const TransferFunction transfer = test::veilAndRamp();
+  const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
+  SweepMemory memory;
+  for (const glm::ivec3 dims : {glm::ivec3(33, 37, 20), glm::ivec3(5, 7, 11), glm::ivec3(70, 9, 5)}) {
+    for (const auto classification : {Classification::preintegrated, Classification::voxel}) {
+      const auto segments = makeSegmentDepth(classification, transfer, coding);
+      for (const uint32_t seed : {16u, 17u}) {
+        const auto codes = encodeValues(test::randomBytes(dims, seed), coding);
+        test::MemorySink sink(dims, 16);
+        StoredCodePlanes planes(codes, dims);
+        sweepAttenuation(planes, dims, 16, *segments, sink, 3, memory);
+        const Planes expected = sweepAll(codes, dims, *segments);
+        for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
+          bool outside = false;
+          EXPECT_EQ(sink.volumeOrder(direction, outside), expected[size_t(direction)]) << direction;
+          EXPECT_TRUE(outside);
+        }
+      }
+    }
+  }
+}
+
 /// Steps that stay inside from p along a direction.
 int stepsInside(glm::ivec3 p, glm::ivec3 dims, int direction) {
   const glm::ivec3 step(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction));
