@@ -20,6 +20,9 @@ size_t lookUpBytes(const uint8_t* bytes, const uint16_t* codes, size_t count, ui
   constexpr size_t kAtOnce = 64;
   // Interleaving leaves 4 entries of every 16 in one register: codes are exchanged so that these follow each other.
   const __m512i exchange = _mm512_setr_epi32(0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15);
+  __m512i table[16];
+  for (size_t i = 0; i < 16; ++i)
+    table[i] = _mm512_loadu_si512(bytes + 64 * i);
   size_t done = 0;
   for (; done + kAtOnce <= count; done += kAtOnce) {
     const __m256i lower = _mm512_cvtepi16_epi8(_mm512_loadu_si512(codes + done));
@@ -28,10 +31,8 @@ size_t lookUpBytes(const uint8_t* bytes, const uint16_t* codes, size_t count, ui
     const __m512i index = _mm512_permutexvar_epi32(exchange, linear);
     const __mmask64 second = _mm512_movepi8_mask(index);
     const auto plane = [&](size_t b) {
-      const uint8_t* table = bytes + 256 * b;
-      const auto part = [&](size_t i) { return _mm512_loadu_si512(table + 64 * i); };
-      const __m512i below = _mm512_permutex2var_epi8(part(0), index, part(1));
-      const __m512i above = _mm512_permutex2var_epi8(part(2), index, part(3));
+      const __m512i below = _mm512_permutex2var_epi8(table[4 * b], index, table[4 * b + 1]);
+      const __m512i above = _mm512_permutex2var_epi8(table[4 * b + 2], index, table[4 * b + 3]);
       return _mm512_mask_blend_epi8(second, below, above);
     };
     const __m512i b0 = plane(0), b1 = plane(1), b2 = plane(2), b3 = plane(3);
@@ -68,6 +69,17 @@ void lookUpCodes(const uint32_t* HWY_RESTRICT entries, const uint8_t* bytes, con
     out[i] = entries[codes[i]];
 }
 
+void convertCodes(const uint16_t* HWY_RESTRICT codes, size_t count, float* HWY_RESTRICT out) {
+  const hn::ScalableTag<float> floats;
+  const hn::RebindToSigned<decltype(floats)> integers;
+  const hn::Rebind<uint16_t, decltype(integers)> halves;
+  size_t i = 0;
+  for (; i + hn::Lanes(floats) <= count; i += hn::Lanes(floats))
+    hn::StoreU(hn::ConvertTo(floats, hn::PromoteTo(integers, hn::LoadU(halves, codes + i))), floats, out + i);
+  for (; i < count; ++i)
+    out[i] = float(codes[i]);
+}
+
 }  // namespace HWY_NAMESPACE
 }  // namespace freevoxel
 HWY_AFTER_NAMESPACE();
@@ -76,6 +88,7 @@ HWY_AFTER_NAMESPACE();
 namespace freevoxel {
 
 HWY_EXPORT(lookUpCodes);
+HWY_EXPORT(convertCodes);
 
 void CodeTable::split() {
   if (bits_.size() > kByteCodes) return;
@@ -89,6 +102,10 @@ void CodeTable::split() {
 void CodeTable::lookUp(std::span<const uint16_t> codes, uint32_t* out) const {
   HWY_DYNAMIC_DISPATCH(lookUpCodes)
   (bits_.data(), bytes_.empty() ? nullptr : bytes_.data(), codes.data(), codes.size(), out);
+}
+
+void codesAsFloats(std::span<const uint16_t> codes, float* out) {
+  HWY_DYNAMIC_DISPATCH(convertCodes)(codes.data(), codes.size(), out);
 }
 
 }  // namespace freevoxel

@@ -1,4 +1,4 @@
-// A number for every value code, looked up row by row.
+// A number for every value code, looked up row by row; or the code itself.
 #pragma once
 
 #include <array>
@@ -38,5 +38,8 @@ class CodeTable {
   /// If no code takes more than a byte: byte b of the entry of code c at 256 b + c.
   std::vector<uint8_t> bytes_;
 };
+
+/// out[i] = codes[i].
+void codesAsFloats(std::span<const uint16_t> codes, float* out);
 
 }  // namespace freevoxel

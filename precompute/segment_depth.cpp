@@ -25,7 +25,7 @@ class VoxelSegments final : public SegmentDepth {
 
   SegmentRule rule() const override { return SegmentRule::neighbour; }
   void terms(std::span<const uint16_t> codes, const MutableSegmentTerms& rows) const override {
-    own_.row(codes, rows.own);
+    if (rows.own != nullptr) own_.row(codes, rows.own);
   }
   void row(std::span<const uint16_t> /*codes*/, std::span<const uint16_t> nextCodes,
            FixedDepth* depths) const override {
@@ -92,10 +92,10 @@ class PreintegratedSegments final : public SegmentDepth {
   SegmentRule rule() const override { return split_ ? SegmentRule::splitIntegral : SegmentRule::integral; }
 
   void terms(std::span<const uint16_t> codes, const MutableSegmentTerms& rows) const override {
-    own_.row(codes, rows.own);
+    if (rows.own != nullptr) own_.row(codes, rows.own);
     high_.row(codes, rows.high);
     if (split_) low_.row(codes, rows.low);
-    std::copy(codes.begin(), codes.end(), rows.code);
+    codesAsFloats(codes, rows.code);
   }
 
   void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const override {

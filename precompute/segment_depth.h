@@ -40,7 +40,7 @@ class SegmentDepth {
  public:
   virtual ~SegmentDepth() = default;
   virtual SegmentRule rule() const = 0;
-  /// Fills the rows that the rule asks for.
+  /// Fills the rows that the rule asks for; not `own` if it is null.
   virtual void terms(std::span<const uint16_t> codes, const MutableSegmentTerms& rows) const = 0;
   /// depths[x] = segment(codes[x], nextCodes[x]); all three of one size.
   virtual void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const = 0;

@@ -82,54 +82,53 @@ SlabBricks sortBricks(const Shape& shape, std::span<const BrickPlanes> bricks) {
   return slab;
 }
 
-/// What voxels contribute to segments: of a strip, the rows beside it and the plane before, in the order of the sweep.
-/// Rows of one strip that the next one needs too stay where they are.
+/// What voxels contribute to segments: of a strip and, unless only a neighbour's own counts, the rows beside it, for a
+/// tile and the plane before, in the order of the sweep. Few enough rows to stay in a near cache: a tile reads them
+/// once for each direction.
 class StripTerms {
  public:
-  StripTerms(const Shape& shape, SegmentRule rule, SweepMemory& memory) {
-    const int rows = (shape.edge + 1) * kPlaneRows;
-    own_ = Rows(rows, shape.width, memory);
+  StripTerms(const Shape& shape, SegmentRule rule, SweepMemory& memory)
+      : beside_(rule == SegmentRule::neighbour ? 0 : 1), own_(kAllRows, shape.width, memory) {
     if (rule == SegmentRule::neighbour) return;
-    code_ = Rows(rows, shape.width, memory);
-    high_ = Rows(rows, shape.width, memory);
-    if (rule == SegmentRule::splitIntegral) low_ = Rows(rows, shape.width, memory);
+    code_ = Rows(kAllRows, shape.width, memory);
+    high_ = Rows(kAllRows, shape.width, memory);
+    if (rule == SegmentRule::splitIntegral) low_ = Rows(kAllRows, shape.width, memory);
   }
 
-  /// The strips of a slab come one after another.
-  void begin(int strip) {
-    filledBefore_ = strip_;
-    strip_ = strip;
-  }
-  void endSlab() { strip_ = kNoStrip; }
+  void begin(int strip) { strip_ = strip; }
 
-  /// Fills a plane of the strip. `place` counts planes from the one before the slab, which is 0.
-  void fill(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int place, int z) {
-    if (z < 0 || z >= shape.dims.z) return;
-    for (int y = -1; y <= kRunEdge; ++y) {
+  /// Fills a plane of the strip. `place` counts planes from the one before the slab, which is 0. The next strip will be
+  /// `nextStrip`.
+  void fill(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int place, int z, int nextStrip) {
+    if (z < 0 || z >= shape.dims.z || (place == 0 && beside_ == 0)) return;
+    for (int y = -beside_; y < kRunEdge + beside_; ++y) {
       const glm::ivec3 first(0, strip_ * kRunEdge + y, z - codes.first);
-      const int yBefore = (strip_ - filledBefore_) * kRunEdge + y;
-      const bool filled = filledBefore_ != kNoStrip && yBefore >= -1 && yBefore <= kRunEdge;
-      if (filled || first.y < 0 || first.y >= shape.dims.y) continue;
-      prefetchRow(shape, codes, first + glm::ivec3(0, kRunEdge * (strip_ < filledBefore_ ? -1 : 1), 0));
-      const int row = place * kPlaneRows + rowInPlane(y);
-      segments.terms({codes.codes + linearIndex(first, shape.dims), size_t(shape.dims.x)},
-                     {own_.row(row), floats(code_, row), floats(high_, row), floats(low_, row)});
+      if (first.y < 0 || first.y >= shape.dims.y) continue;
+      const bool within = y >= 0 && y < kRunEdge;
+      if (within) prefetchRow(shape, codes, {0, nextStrip * kRunEdge + y, first.z});
+      const int row = place % kPlanes * kPlaneRows + y + 1;
+      segments.terms(
+          {codes.codes + linearIndex(first, shape.dims), size_t(shape.dims.x)},
+          {within && place != 0 ? own_.row(row) : nullptr, floats(code_, row), floats(high_, row), floats(low_, row)});
     }
   }
 
   SegmentTerms all() { return {own_.row(0), floats(code_, 0), floats(high_, 0), floats(low_, 0)}; }
-  /// Entry in all() at which a plane starts.
-  uint32_t plane(int place) const { return entry(place * kPlaneRows); }
+  /// Entry in all() at which a plane starts, one of the last kPlanes filled.
+  uint32_t plane(int place) const { return entry(place % kPlanes * kPlaneRows); }
   /// From there to row y of the strip, -1..kRunEdge.
-  uint32_t row(int y) const { return entry(rowInPlane(y)); }
+  uint32_t row(int y) const { return entry(y + 1); }
   /// From there to a row outside the volume.
-  uint32_t nothing() const { return entry(kRows); }
+  uint32_t nothing() const { return entry(kPlaneRows - 1); }
 
  private:
-  static constexpr int kRows = kRunEdge + 2;
-  static constexpr int kPlaneRows = kRows + 1;  ///< the last one is nothing
-  static constexpr int kNoStrip = -1;
-  int rowInPlane(int y) const { return (strip_ * kRunEdge + y + 1) % kRows; }
+  static constexpr int kPlanes = kRunEdge + 1;
+  static constexpr int kPlaneRows = kRunEdge + 3;  ///< the last one is nothing
+
+ public:
+  static constexpr int kAllRows = kPlanes * kPlaneRows;
+
+ private:
   uint32_t entry(int row) const { return uint32_t(size_t(row) * own_.stride()); }
   static float* floats(Rows& rows, int row) {
     return rows.stride() == 0 ? nullptr : reinterpret_cast<float*>(rows.row(row));
@@ -144,8 +143,9 @@ class StripTerms {
   }
 
   static constexpr int kCodesPerLine = 32;
+  int beside_;  ///< rows beside the strip that count
   Rows own_, code_, high_, low_;
-  int strip_ = kNoStrip, filledBefore_ = kNoStrip;
+  int strip_ = 0;
 };
 
 /// What a thread needs for the strip at hand.
@@ -177,10 +177,7 @@ class DirectionSweep {
       : direction_(direction),
         step_(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction)),
         state_(step_.z != 0 ? shape.strips() * kRunEdge : 0, shape.width, memory) {
-    if (step_.y != 0) {
-      for (Rows& rows : edges_)
-        rows = Rows(shape.edge + 1, shape.width, memory);
-    }
+    if (step_.y != 0) edges_ = Rows(edgeRows(shape), shape.width, memory);
     tile_.rule = rule;
     tile_.stride = state_.stride();
     tile_.width = shape.width;
@@ -231,13 +228,13 @@ class DirectionSweep {
       tile_.neighbour[row] = scratch.terms.row(y + step_.y);
     }
     if (step_.y != 0 && step_.z != 0) {
-      std::memcpy(edges_[1].row(0), tile_.state + size_t(tile_.leavingRow) * tile_.stride,
+      std::memcpy(leaving(shape, 0), tile_.state + size_t(tile_.leavingRow) * tile_.stride,
                   size_t(shape.width) * sizeof(FixedDepth));
     }
   }
 
   /// After its last tile.
-  void endStrip() { std::swap(edges_[0], edges_[1]); }
+  void endStrip(const Shape& shape) { firstEdge_ = (firstEdge_ + edgeRows(shape) - edgeShift()) % edgeRows(shape); }
 
   /// Four planes of the strip: their bytes go to the bricks.
   void sweep(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const SlabBricks& bricks,
@@ -259,8 +256,8 @@ class DirectionSweep {
         plane.neighbourOutside = z + step_.z < 0 || z + step_.z >= shape.dims.z;
         plane.bytes = bytes + size_t(z % kRunEdge) * planeBytes;
         if (step_.y == 0) continue;
-        plane.beyond = edges_[0].row(neighbourPlace);
-        plane.leaving = edges_[1].row(done + 1);
+        plane.beyond = beyond(shape, neighbourPlace);
+        plane.leaving = leaving(shape, done + 1);
       }
       if (levels.depths != nullptr) {
         sweepPlanes(shape, codes, place, levels, scratch.depths.row(0));
@@ -277,6 +274,12 @@ class DirectionSweep {
   }
 
  private:
+  static int edgeRows(const Shape& shape) { return shape.edge + 2; }
+  /// How far the place of what leaves lies before that of what comes in.
+  int edgeShift() const { return step_.z != 0 ? 1 : 0; }
+  FixedDepth* beyond(const Shape& shape, int place) { return edges_.row((firstEdge_ + place) % edgeRows(shape)); }
+  FixedDepth* leaving(const Shape& shape, int place) { return beyond(shape, place + edgeRows(shape) - edgeShift()); }
+
   /// One plane of the tile after the other, since level 1 needs the depths of each.
   void sweepPlanes(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const LevelTarget& levels,
                    FixedDepth* depths) {
@@ -307,9 +310,10 @@ class DirectionSweep {
   glm::ivec3 step_;
   /// Of the plane before, or of a strip of this one if the direction stays in its plane.
   Rows state_;
-  /// The rows through which rays come in from the strip before, and those through which they leave this one: before the
-  /// first plane of the slab, and after each.
-  Rows edges_[2];
+  /// A ring of the rows through which rays come in from the strip before: before the first plane of the slab, and after
+  /// each. A row through which they leave this strip takes the place of the one that the same plane has read.
+  Rows edges_;
+  int firstEdge_ = 0;
   Tile tile_;  ///< at hand
   LevelTap tap_;
 };
@@ -343,7 +347,8 @@ struct SweepGroup {
     for (int i = 0; i < shape.strips(); ++i) {
       const int strip = ascending ? i : shape.strips() - 1 - i;
       scratch.terms.begin(strip);
-      scratch.terms.fill(shape, segments, codes, 0, pass == 0 ? first - 1 : first + planes);
+      const int nextStrip = ascending ? strip + 1 : strip - 1;
+      scratch.terms.fill(shape, segments, codes, 0, pass == 0 ? first - 1 : first + planes, nextStrip);
       for (DirectionSweep& sweep : sweeps)
         sweep.beginStrip(shape, strip, bricks, scratch);
       int done = 0;
@@ -352,15 +357,14 @@ struct SweepGroup {
         place.planes = std::clamp(planes - place.runZ * kRunEdge, 0, kRunEdge);
         place.firstZ = first + place.runZ * kRunEdge + (pass == 0 ? 0 : place.planes - 1);
         for (int p = 0; p < place.planes; ++p)
-          scratch.terms.fill(shape, segments, codes, done + p + 1, place.firstZ + order * p);
+          scratch.terms.fill(shape, segments, codes, done + p + 1, place.firstZ + order * p, nextStrip);
         for (DirectionSweep& sweep : sweeps)
           sweep.sweep(shape, codes, place, bricks, levels, scratch);
         done += place.planes;
       }
       for (DirectionSweep& sweep : sweeps)
-        sweep.endStrip();
+        sweep.endStrip(shape);
     }
-    scratch.terms.endSlab();
     finishStores();
   }
 };
@@ -394,8 +398,8 @@ std::vector<SweepGroup> makeGroups(unsigned passes, bool bordersOnly, int thread
 uint64_t sweepMemory(const Shape& shape, int passCount, int threads) {
   const uint64_t row = uint64_t(shape.width) + 2 * kRowUnit;
   const auto e = uint64_t(shape.edge);
-  const uint64_t directionRows = 9 * uint64_t(shape.strips()) * kRunEdge + 9 * 2 * (e + 1);
-  const uint64_t threadRows = 4 * (e + 1) * (kRunEdge + 3) + 2 * kRunEdge + 1;
+  const uint64_t directionRows = 9 * uint64_t(shape.strips()) * kRunEdge + 9 * (e + 2);
+  const uint64_t threadRows = 4 * StripTerms::kAllRows + 2 * kRunEdge + 1;
   return row * (uint64_t(passCount) * directionRows + uint64_t(threads) * threadRows);
 }
 

@@ -283,30 +283,32 @@ HWY_INLINE void renewPlane(const Tile& tile, const TilePlane& plane) {
 }
 
 /// One plane in itself, row by row, against stepY; within a row against stepX.
-template <SegmentRule rule, int stepX>
+template <SegmentRule rule, int stepX, int stepY>
 HWY_INLINE void renewAcrossRows(const Tile& tile, const TilePlane& plane) {
   const Tag tag;
   const PlaneRows at(tile, plane);
-  const size_t first = tile.stepY < 0 ? 0 : kRunEdge - 1;
   const FixedDepth* const beyond = tile.beyondRow < 0 ? nullptr : plane.beyond;
-  Depths beside[kRunEdge];
-  for (Depths& row : beside)
-    row = hn::Zero(tag);
+  // What the rows before passed on in the vector before. No array: that would not be kept in registers.
+  Depths beside0 = hn::Zero(tag), beside1 = beside0, beside2 = beside0, beside3 = beside0;
   forRow(tile.width, stepX > 0, [&](ptrdiff_t x) HWY_ATTR {
     FourRows rows;
     Depths passed = beyond != nullptr ? hn::LoadU(tag, beyond + x) : hn::Zero(tag);
-    for (size_t i = 0; i < kRunEdge; ++i) {
-      const size_t row = first == 0 ? i : first - i;
+    const auto renewRow = [&](size_t i, Depths& beside) HWY_ATTR {
+      const size_t row = stepY < 0 ? i : kRunEdge - 1 - i;
       Depths depths = passed;
-      if constexpr (stepX != 0) depths = shifted<stepX>(passed, beside[i]);
-      beside[i] = passed;
+      if constexpr (stepX != 0) depths = shifted<stepX>(passed, beside);
+      beside = passed;
       if constexpr (rule != SegmentRule::neighbour)
         depths = hn::Add(depths, segmentsBetween<rule>(tile.terms, at.from[row] + x, at.neighbour[row] + x));
       if (!tile.linked[row]) depths = hn::Zero(tag);
       if (!at.inside.all(x)) depths = at.inside.only(depths, x);
       rows[row] = depths;
       passed = passedOn<rule>(depths, tile.terms, at.own[row] + x);
-    }
+    };
+    renewRow(0, beside0);
+    renewRow(1, beside1);
+    renewRow(2, beside2);
+    renewRow(3, beside3);
     hn::StoreU(kept(passed), tag, plane.leaving + x);
     give(tile, plane, rows, x);
   });
@@ -318,12 +320,11 @@ HWY_INLINE void renewAlongRows(const Tile& tile, const TilePlane& plane) {
   constexpr bool kUp = stepX < 0;
   const Tag tag;
   const PlaneRows at(tile, plane);
-  Depths before[kRunEdge];  // sums of the vector before; with the rule `neighbour` those of all its lanes matter
-  for (Depths& row : before)
-    row = hn::Zero(tag);
+  // The sum up to the vector before, in all lanes. No array: that would not be kept in registers.
+  Depths before0 = hn::Zero(tag), before1 = before0, before2 = before0, before3 = before0;
   forRow(tile.width, !kUp, [&](ptrdiff_t x) HWY_ATTR {
     FourRows rows;
-    for (size_t row = 0; row < kRunEdge; ++row) {
+    const auto renewRow = [&](size_t row, Depths& before) HWY_ATTR {
       Depths v;
       if constexpr (rule == SegmentRule::neighbour) {
         v = hn::LoadU(tag, tile.terms.own + at.own[row] + x);
@@ -331,10 +332,14 @@ HWY_INLINE void renewAlongRows(const Tile& tile, const TilePlane& plane) {
         v = segmentsBetween<rule>(tile.terms, at.from[row] + x, at.neighbour[row] + x);
         if (!at.inside.all(x)) v = at.inside.only(v, x);
       }
-      const Depths sums = kept(hn::Add(runningSum<kUp>(v), lastOf<kUp>(before[row])));
-      rows[row] = rule == SegmentRule::neighbour ? shifted<stepX>(sums, before[row]) : sums;
-      before[row] = sums;
-    }
+      const Depths sums = kept(hn::Add(runningSum<kUp>(v), before));
+      rows[row] = rule == SegmentRule::neighbour ? shifted<stepX>(sums, before) : sums;
+      before = lastOf<kUp>(sums);
+    };
+    renewRow(0, before0);
+    renewRow(1, before1);
+    renewRow(2, before2);
+    renewRow(3, before3);
     // A running sum carries on behind the volume.
     keepInside(at.inside, x, rows);
     give(tile, plane, rows, x);
@@ -360,14 +365,21 @@ void clearPlane(const Tile& tile, const TilePlane& plane) {
   }
 }
 
+template <SegmentRule rule, int stepY>
+HWY_INLINE void renewAcrossRowsBy(const Tile& tile, const TilePlane& plane) {
+  if (tile.stepX == 0) {
+    renewAcrossRows<rule, 0, stepY>(tile, plane);
+  } else {
+    tile.stepX < 0 ? renewAcrossRows<rule, -1, stepY>(tile, plane) : renewAcrossRows<rule, 1, stepY>(tile, plane);
+  }
+}
+
 template <SegmentRule rule>
 void renewWithinPlane(const Tile& tile, const TilePlane& plane) {
   if (tile.stepY == 0) {
     tile.stepX < 0 ? renewAlongRows<rule, -1>(tile, plane) : renewAlongRows<rule, 1>(tile, plane);
-  } else if (tile.stepX == 0) {
-    renewAcrossRows<rule, 0>(tile, plane);
   } else {
-    tile.stepX < 0 ? renewAcrossRows<rule, -1>(tile, plane) : renewAcrossRows<rule, 1>(tile, plane);
+    tile.stepY < 0 ? renewAcrossRowsBy<rule, -1>(tile, plane) : renewAcrossRowsBy<rule, 1>(tile, plane);
   }
 }
 

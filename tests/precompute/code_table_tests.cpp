@@ -33,14 +33,19 @@ TEST(CodeTable, rowsAreLookedUpLikeSingleCodes) {
         std::vector<float> foundFloats(count + 2, 1234.0f);
         numberTable.row(row, foundNumbers.data() + 1);
         floatTable.row(row, foundFloats.data() + 1);
+        std::vector<float> converted(count + 2, 0.5f);
+        codesAsFloats(row, converted.data() + 1);
         for (size_t i = 0; i < count; ++i) {
           ASSERT_EQ(foundNumbers[i + 1], numbers[row[i]]);
           ASSERT_EQ(foundFloats[i + 1], floats[row[i]]);
+          ASSERT_EQ(converted[i + 1], float(row[i]));
         }
         EXPECT_EQ(foundNumbers.front(), 1234u);
         EXPECT_EQ(foundNumbers.back(), 1234u);
         EXPECT_EQ(foundFloats.front(), 1234.0f);
         EXPECT_EQ(foundFloats.back(), 1234.0f);
+        EXPECT_EQ(converted.front(), 0.5f);
+        EXPECT_EQ(converted.back(), 0.5f);
       }
     }
   }
