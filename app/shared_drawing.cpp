@@ -128,8 +128,9 @@ Sums SharedDrawing::drawByLevel(float quantum, const std::vector<uint8_t>& share
   return sum;
 }
 
-SplatResult SharedDrawing::render(const Camera& camera, const SplatOptions& options) {
+SplatResult SharedDrawing::render(const Camera& camera, SplatOptions options) {
   const Ranks& ranks = session_.ranks();
+  options.blockwise = ranks.rankCount() > 1;
   splatter_.prepare(camera, options);
   // What is to be drawn may depend on the view.
   std::vector<uint8_t> share;

@@ -48,7 +48,7 @@ class SharedDrawing {
 
   /// Sums and statistics: on rank 0 the sums of all, elsewhere of no use; statistics of this rank. The same bits for
   /// any number of ranks. Throws as Splatter::render does, RankFailed, and InputError if the partition will not do.
-  SplatResult render(const Camera& camera, const SplatOptions& options);
+  SplatResult render(const Camera& camera, SplatOptions options);
 
   /// Fills statistics "ranks" with what every rank did in all frames; nothing for one rank.
   void report();

@@ -106,9 +106,8 @@ $(section refinement)
 
 ## Frame time and PSNR over --lod
 
-512 x 512, one view, the C++ backend, median of 5. With --lod above 0 default attenuation leaves
-out the near field, which takes the values of the whole volume: that is the difference where all blocks are of the finest
-level.
+512 x 512, one view, the C++ backend, median of 5. Where all blocks are of the finest level the picture is that of \`--lod 0\`
+to the last bit (999 dB), though near fields are then traced brick by brick.
 
 $(section detail)
 

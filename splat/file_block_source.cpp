@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <glm/glm.hpp>
+#include <iterator>
 #include <utility>
 
 #include "base/error.h"
@@ -13,6 +14,7 @@
 #include "precompute/stored_bricks.h"
 #include "splat/cover_values.h"
 #include "splat/grid_block_source.h"
+#include "splat/near_field.h"
 
 namespace freevoxel {
 
@@ -49,15 +51,26 @@ FileBlockSource::FileBlockSource(const AttenuationFile& file, View view, std::op
     }
     levels_.push_back(std::move(looked));
   }
+  if (view_.eye.nearField) nearTargets_.push_back(-1);
+  for (size_t n = 0; n < view_.lamps.size(); ++n) {
+    if (near(0, view_.lamps[n].stored)) nearTargets_.push_back(int(n));
+  }
+  check(nearTargets_.empty() || (view_.table != nullptr && view_.visibility != nullptr),
+        "near fields have what classifies values");
 }
 
-uint64_t FileBlockSource::bytesPerBlock(int edge, int brickEdge, bool lit, bool shaded) {
+uint64_t FileBlockSource::bytesPerBlock(int edge, int brickEdge, const View& view) {
+  const bool lit = view.lighting != nullptr, shaded = lit && view.lighting->shaded();
+  uint64_t nearTargets = view.eye.nearField ? 1 : 0;
+  for (const LampSource& lamp : view.lamps)
+    nearTargets += lamp.stored && lamp.stored->nearField ? 1 : 0;
   // The block, its apron of one voxel before and two behind, wherever it lies among the bricks.
   const auto bricks = uint64_t((edge + 2) / brickEdge + 2);
-  const uint64_t around = shaded ? bricks + 2 : bricks;
+  const uint64_t around = shaded || nearTargets > 0 ? bricks + 2 : bricks;
   const auto voxels = uint64_t(brickEdge) * uint64_t(brickEdge) * uint64_t(brickEdge);
+  const uint64_t classified = sizeof(TableEntry) + (shaded ? sizeof(shared::CoverValue) : 0);
   return voxels * (bricks * bricks * bricks * (sizeof(uint16_t) + (lit ? sizeof(LightValue) : 0)) +
-                   around * around * around * (sizeof(TableEntry) + (shaded ? sizeof(shared::CoverValue) : 0)));
+                   around * around * around * std::max(classified, (1 + nearTargets) * sizeof(uint16_t)));
 }
 
 std::vector<VisibleBlock> FileBlockSource::storedBlocks(const AttenuationFile& file, int level, int edge) {
@@ -129,17 +142,18 @@ std::vector<FileBlockSource::Place> FileBlockSource::bricksOf(std::span<const Vi
   return places;
 }
 
-std::vector<FileBlockSource::Place> FileBlockSource::withNeighbours(const std::vector<Place>& places) const {
+std::vector<FileBlockSource::Place> FileBlockSource::withNeighbours(const std::vector<Place>& places, int most,
+                                                                    bool corners) const {
   std::unordered_map<uint64_t, Place> all;
   for (const Place& place : places) {
     all.emplace(key(place), place);
+    if (place.level > most) continue;
     const glm::ivec3 bricks = brickDims(dims(place.level), file_.brickEdge());
-    for (int axis = 0; axis < 3; ++axis) {
-      for (const int step : {-1, 1}) {
-        Place next = place;
-        next.position[axis] += step;
-        if (next.position[axis] >= 0 && next.position[axis] < bricks[axis]) all.emplace(key(next), next);
-      }
+    for (int n = 0; n < 27; ++n) {
+      const glm::ivec3 step(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      if (!corners && std::abs(step.x) + std::abs(step.y) + std::abs(step.z) > 1) continue;
+      const Place next{place.level, place.position + step};
+      if (glm::clamp(next.position, glm::ivec3(0), bricks - 1) == next.position) all.emplace(key(next), next);
     }
   }
   std::vector<Place> result;
@@ -152,27 +166,43 @@ void FileBlockSource::prepare(std::span<const VisibleBlock> blocks) {
   bricks_.nextCall();
   const std::vector<Place> needed = bricksOf(blocks);
   const bool shaded = lit() && view_.lighting->shaded();
-  const std::vector<Place> valued = shaded ? withNeighbours(needed) : needed;
-  std::vector<std::pair<Place, HeldBrick*>> withoutValues, notViewed;
+  std::vector<Place> looked;
+  if (!nearTargets_.empty()) {
+    std::vector<Place> ofFinest;
+    std::copy_if(needed.begin(), needed.end(), std::back_inserter(ofFinest),
+                 [](const Place& place) { return place.level == 0; });
+    looked = withNeighbours(ofFinest, 0, true);
+  }
+  std::unordered_map<uint64_t, Place> valued;
+  for (const Place& place : shaded ? withNeighbours(needed, file_.levels(), false) : needed)
+    valued.emplace(key(place), place);
+  for (const Place& place : looked)
+    valued.emplace(key(place), place);
+  std::vector<std::pair<Place, HeldBrick*>> withoutValues, withoutFar, notViewed;
   std::vector<glm::ivec3> finest;
-  for (const Place& place : valued) {
+  for (const auto& [number, place] : valued) {
+    HeldBrick& brick = bricks_.use(number);
+    if (hasValues(place, brick)) continue;
+    withoutValues.emplace_back(place, &brick);
+    if (place.level == 0) finest.push_back(place.position);
+  }
+  for (const Place& place : looked) {
     HeldBrick& brick = bricks_.use(key(place));
-    if (!hasValues(place, brick)) {
-      withoutValues.emplace_back(place, &brick);
-      if (place.level == 0) finest.push_back(place.position);
-    }
+    if (brick.farIn != bricks_.frame()) withoutFar.emplace_back(place, &brick);
   }
   for (const Place& place : needed) {
     HeldBrick& brick = bricks_.use(key(place));
     if (brick.viewedIn != bricks_.frame()) notViewed.emplace_back(place, &brick);
   }
-  for (const auto& [place, brick] : notViewed) {
-    if (const auto stored = file_.findLevelBrick(place.level, place.position)) file_.prefetch(place.level, *stored);
+  for (const auto* bricks : {&withoutFar, &notViewed}) {
+    for (const auto& [place, brick] : *bricks) {
+      if (const auto stored = file_.findLevelBrick(place.level, place.position)) file_.prefetch(place.level, *stored);
+    }
   }
   if (!finest.empty() && !absent_) absent_.emplace(file_);
   if (!finest.empty()) absent_->read(finest);
   FirstException failure;
-  // In two rounds, since shading looks at neighbours' values.
+  // In rounds, since shading looks at neighbours' values, and near fields at their attenuation too.
   const auto readAll = [&](const std::vector<std::pair<Place, HeldBrick*>>& bricks, auto read) {
 #pragma omp parallel for schedule(dynamic, 1)
     for (int64_t i = 0; i < int64_t(bricks.size()); ++i)
@@ -181,12 +211,15 @@ void FileBlockSource::prepare(std::span<const VisibleBlock> blocks) {
   };
   try {
     readAll(withoutValues, &FileBlockSource::readValues);
+    readAll(withoutFar, &FileBlockSource::readFar);
     readAll(notViewed, &FileBlockSource::readAttenuation);
     file_.checkIntact();
   } catch (...) {
     bricks_.clear();  // some may be half read
     throw;
   }
+  for (const auto& [place, brick] : withoutFar)
+    brick->farIn = bricks_.frame();
   for (const auto& [place, brick] : notViewed)
     brick->viewedIn = bricks_.frame();
   bricks_.count();
@@ -233,33 +266,77 @@ void FileBlockSource::readValues(const Place& place, HeldBrick& brick) const {
   if (matter()) brick.matter = std::move(read);
 }
 
-void FileBlockSource::readAttenuation(const Place& place, HeldBrick& brick) const {
-  const int edge = file_.brickEdge();
-  const glm::ivec3 origin = place.position * edge;
-  const Level& level = levels_[size_t(place.level)];
-  const auto stored = file_.findLevelBrick(place.level, place.position);
-  brick.attenuations.assign(brickVoxels(), uint16_t(AttenuationGrid::kUnit));
-  std::optional<BrickView> view;
-  if (stored) {
-    DirectionSet directions = level.eye.directions(origin);
-    for (const auto& lamp : level.lamps) {
-      if (lamp) directions |= lamp->directions(origin);
-    }
-    view.emplace(file_.levelBrick(place.level, *stored, directions, false));
+void FileBlockSource::readFar(const Place& place, HeldBrick& brick) const {
+  const glm::ivec3 edge(file_.brickEdge()), origin = place.position * edge;
+  brick.far.resize(nearTargets_.size());
+  for (std::vector<uint16_t>& towards : brick.far)
+    towards.assign(brickVoxels(), uint16_t(AttenuationGrid::kUnit));
+  if (const auto stored = file_.findLevelBrick(place.level, place.position)) {
+    DirectionSet directions = 0;
+    for (const int lamp : nearTargets_)
+      directions |= lookup(place.level, lamp).directions(origin);
+    const BrickView view = file_.levelBrick(place.level, *stored, directions);
     std::vector<float> looked(brickVoxels());
-    level.eye.look(*view, looked);
-    for (size_t i = 0; i < looked.size(); ++i)
-      brick.attenuations[i] = uint16_t(looked[view->steps[i]] * AttenuationGrid::kUnit + 0.5f);
+    for (size_t n = 0; n < nearTargets_.size(); ++n) {
+      lookup(place.level, nearTargets_[n]).look(view, looked);
+      for (size_t i = 0; i < looked.size(); ++i)
+        brick.far[n][i] = uint16_t(looked[view.steps[i]] * AttenuationGrid::kUnit + 0.5f);
+    }
   }
-  if (view_.eye.ratio != nullptr) view_.eye.ratio->correct(origin, glm::ivec3(edge), place.level, brick.attenuations);
-  if (lit()) lightBrick(place, view ? &*view : nullptr, brick);
+  for (size_t n = 0; n < nearTargets_.size(); ++n) {
+    const CoarseRatio* ratio = target(nearTargets_[n]).ratio;
+    if (ratio != nullptr) ratio->correct(origin, edge, place.level, brick.far[n]);
+  }
 }
 
-void FileBlockSource::lightBrick(const Place& place, const BrickView* view, HeldBrick& brick) const {
+void FileBlockSource::traceNearField(const Place& place, size_t n, std::span<uint16_t> attenuations) const {
+  const int edge = file_.brickEdge();
+  const glm::ivec3 origin = place.position * edge;
+  NearFieldBox box = nearFieldBox(file_.dims(), origin, edge);
+  std::vector<uint16_t> codes(voxelCount(box.size)), far(codes.size());
+  copyBox(
+      0, box.first, box.size, [](const HeldBrick& brick) { return brick.codes.data(); }, codes.data());
+  copyBox(
+      0, box.first, box.size, [&](const HeldBrick& brick) { return brick.far[n].data(); }, far.data());
+  box.codes = codes;
+  box.far = far;
+  brickNearField(file_.dims(), *view_.table, *view_.visibility, target(nearTargets_[n]).towards, box, origin, edge,
+                 attenuations);
+}
+
+void FileBlockSource::readAttenuation(const Place& place, HeldBrick& brick) const {
+  const glm::ivec3 edge(file_.brickEdge()), origin = place.position * edge;
+  const Level& level = levels_[size_t(place.level)];
+  const bool nearEye = near(place.level, view_.eye);
+  brick.attenuations.assign(brickVoxels(), uint16_t(AttenuationGrid::kUnit));
+  const auto stored = file_.findLevelBrick(place.level, place.position);
+  std::optional<BrickView> view;
+  if (stored) {
+    DirectionSet directions = nearEye ? 0 : level.eye.directions(origin);
+    for (size_t n = 0; n < level.lamps.size(); ++n) {
+      if (level.lamps[n] && !near(place.level, view_.lamps[n].stored)) directions |= level.lamps[n]->directions(origin);
+    }
+    if (directions != 0) view.emplace(file_.levelBrick(place.level, *stored, directions, false));
+  }
+  if (nearEye) {
+    traceNearField(place, 0, brick.attenuations);
+  } else {
+    if (view) {
+      std::vector<float> looked(brickVoxels());
+      level.eye.look(*view, looked);
+      for (size_t i = 0; i < looked.size(); ++i)
+        brick.attenuations[i] = uint16_t(looked[view->steps[i]] * AttenuationGrid::kUnit + 0.5f);
+    }
+    if (view_.eye.ratio != nullptr) view_.eye.ratio->correct(origin, edge, place.level, brick.attenuations);
+  }
+  if (lit()) lightBrick(place, stored.has_value(), view ? &*view : nullptr, brick);
+}
+
+void FileBlockSource::lightBrick(const Place& place, bool stored, const BrickView* view, HeldBrick& brick) const {
   const int edge = file_.brickEdge();
   const size_t voxels = brickVoxels();
   brick.lights.assign(voxels, LightValue{0, 0, 0, 0});
-  if (view == nullptr) return;  // nothing is visible there
+  if (!stored) return;  // nothing is visible there
   const glm::ivec3 origin = place.position * edge;
   const double finest = double(1 << place.level);
   std::vector<glm::dvec3> places(voxels);
@@ -277,6 +354,14 @@ void FileBlockSource::lightBrick(const Place& place, const BrickView* view, Held
         const glm::ivec3 p = glm::min(glm::ivec3(places[i]), file_.dims() - 1);
         ofLamp[i] = float(lamp.swept->values[linearIndex(p, file_.dims())]) * (1.0f / AttenuationGrid::kUnit);
       }
+      continue;
+    }
+    if (near(place.level, lamp.stored)) {
+      const auto found = std::find(nearTargets_.begin(), nearTargets_.end(), int(n));
+      corrected.assign(voxels, uint16_t(AttenuationGrid::kUnit));
+      traceNearField(place, size_t(found - nearTargets_.begin()), corrected);
+      for (size_t i = 0; i < voxels; ++i)
+        ofLamp[i] = float(corrected[i]) * (1.0f / AttenuationGrid::kUnit);
       continue;
     }
     levels_[size_t(place.level)].lamps[n]->look(*view, looked);
@@ -337,53 +422,54 @@ std::vector<glm::vec3> FileBlockSource::gradients(const Place& place, const Held
   return result;
 }
 
-void FileBlockSource::gather(const VisibleBlock& block, BlockSamples& samples) const {
-  const int edge = file_.brickEdge(), side = blockSide(edge_);
-  const int shift = std::countr_zero(unsigned(edge)), mask = edge - 1;
-  const glm::ivec3 last = dims(block.level) - 1;
-  const glm::ivec3 low = glm::clamp(block.origin - 1, glm::ivec3(0), last) / edge;
-  const glm::ivec3 high = glm::clamp(block.origin + edge_ + 1, glm::ivec3(0), last) / edge;
+template <class T, class VoxelsOf>
+void FileBlockSource::copyBox(int level, glm::ivec3 first, glm::ivec3 size, const VoxelsOf& voxelsOf, T* out) const {
+  const int edge = file_.brickEdge(), shift = std::countr_zero(unsigned(edge)), mask = edge - 1;
+  const glm::ivec3 last = dims(level) - 1;
+  const glm::ivec3 low = glm::clamp(first, glm::ivec3(0), last) / edge;
+  const glm::ivec3 high = glm::clamp(first + size - 1, glm::ivec3(0), last) / edge;
   const glm::ivec3 count = high - low + 1;
-  std::vector<const HeldBrick*> bricks(voxelCount(count));
-  for (size_t i = 0; i < bricks.size(); ++i) {
+  std::vector<const T*> voxels(voxelCount(count));
+  for (size_t i = 0; i < voxels.size(); ++i) {
     const glm::ivec3 at(int(i) % count.x, int(i) / count.x % count.y, int(i) / (count.x * count.y));
-    bricks[i] = &brick({block.level, low + at});
+    voxels[i] = voxelsOf(brick({level, low + at}));
   }
+  for (int z = 0; z < size.z; ++z) {
+    const int pz = std::clamp(first.z + z, 0, last.z);
+    for (int y = 0; y < size.y; ++y, out += size.x) {
+      const int py = std::clamp(first.y + y, 0, last.y);
+      const T* const* ofRow = voxels.data() + count.x * (((py >> shift) - low.y) + count.y * ((pz >> shift) - low.z));
+      const int row = edge * ((py & mask) + edge * (pz & mask));
+      // In runs that lie in one brick.
+      for (int x = 0; x < size.x;) {
+        const int px = std::clamp(first.x + x, 0, last.x);
+        const T* from = ofRow[(px >> shift) - low.x] + row + (px & mask);
+        const bool beyond = first.x + x != px;
+        const int run = beyond ? 1 : std::min({size.x - x, edge - (px & mask), last.x - px + 1});
+        std::copy_n(from, run, out + x);
+        x += run;
+      }
+    }
+  }
+}
+
+void FileBlockSource::gather(const VisibleBlock& block, BlockSamples& samples) const {
+  const glm::ivec3 first = block.origin - 1, size(blockSide(edge_));
   const size_t voxels = blockVoxels(edge_);
   samples.codes.resize(block.level == 0 ? voxels : 0);
   samples.matter.resize(block.level == 0 || cover() ? 0 : voxels);
   samples.cover.resize(block.level == 0 || !cover() ? 0 : voxels);
   samples.attenuations.resize(voxels);
   samples.lights.resize(lit() ? voxels : 0);
-  // Rows in runs that lie in one brick; places beyond the volume take the outermost voxel.
-  const auto copyRow = [&](auto member, auto* out, size_t rowBricks, size_t row) {
-    for (int x = 0; x < side;) {
-      const int px = std::clamp(block.origin.x - 1 + x, 0, last.x);
-      const auto* from = (bricks[rowBricks + size_t((px >> shift) - low.x)]->*member).data() + row + size_t(px & mask);
-      const bool beyond = block.origin.x - 1 + x != px;
-      const int run = beyond ? 1 : std::min({side - x, edge - (px & mask), last.x - px + 1});
-      std::copy_n(from, run, out + x);
-      x += run;
-    }
+  const auto copy = [&](auto member, auto& to) {
+    copyBox(
+        block.level, first, size, [&](const HeldBrick& brick) { return (brick.*member).data(); }, to.data());
   };
-  size_t to = 0;
-  for (int z = 0; z < side; ++z) {
-    const int pz = std::clamp(block.origin.z - 1 + z, 0, last.z);
-    for (int y = 0; y < side; ++y, to += size_t(side)) {
-      const int py = std::clamp(block.origin.y - 1 + y, 0, last.y);
-      const size_t rowBricks = size_t(count.x) * size_t(((py >> shift) - low.y) + count.y * ((pz >> shift) - low.z));
-      const size_t row = size_t(edge) * size_t((py & mask) + edge * (pz & mask));
-      copyRow(&HeldBrick::attenuations, samples.attenuations.data() + to, rowBricks, row);
-      if (block.level == 0) {
-        copyRow(&HeldBrick::codes, samples.codes.data() + to, rowBricks, row);
-      } else if (cover()) {
-        copyRow(&HeldBrick::cover, samples.cover.data() + to, rowBricks, row);
-      } else {
-        copyRow(&HeldBrick::matter, samples.matter.data() + to, rowBricks, row);
-      }
-      if (lit()) copyRow(&HeldBrick::lights, samples.lights.data() + to, rowBricks, row);
-    }
-  }
+  copy(&HeldBrick::attenuations, samples.attenuations);
+  if (!samples.codes.empty()) copy(&HeldBrick::codes, samples.codes);
+  if (!samples.matter.empty()) copy(&HeldBrick::matter, samples.matter);
+  if (!samples.cover.empty()) copy(&HeldBrick::cover, samples.cover);
+  if (lit()) copy(&HeldBrick::lights, samples.lights);
   AttenuationGrid faces;
   faces.setOpenFaces(view_.eye.towards, file_.dims());
   openApron(faces.openLow, faces.openHigh, dims(block.level), block.origin, edge_, samples.attenuations);

@@ -5,6 +5,22 @@
 
 namespace freevoxel {
 
+namespace {
+
+template <class T>
+uint64_t bytesOf(const std::vector<T>& values) {
+  return values.capacity() * sizeof(T);
+}
+
+}  // namespace
+
+uint64_t HeldBrick::bytes() const {
+  uint64_t sum = bytesOf(codes) + bytesOf(matter) + bytesOf(cover) + bytesOf(attenuations) + bytesOf(lights);
+  for (const std::vector<uint16_t>& towards : far)
+    sum += bytesOf(towards);
+  return sum;
+}
+
 HeldBrick& HeldBricks::use(uint64_t number) {
   HeldBrick& brick = bricks_[number];
   brick.lastUsed = call_;

@@ -16,16 +16,15 @@ struct HeldBrick {
   std::vector<uint16_t> codes;     ///< of level 0
   std::vector<TableEntry> matter;  ///< of levels from 1 on, if it is looked at: colour times extinction, extinction
   std::vector<shared::CoverValue> cover;  ///< the same
-  std::vector<uint16_t> attenuations;     ///< towards the eye, of AttenuationGrid::kUnit, of the frame `viewedIn`
-  std::vector<LightValue> lights;         ///< of the same frame; empty: unlit
+  /// Attenuation without near fields, of the frame `farIn`: towards each target that has one.
+  std::vector<std::vector<uint16_t>> far;
+  uint64_t farIn = 0;
+  std::vector<uint16_t> attenuations;  ///< towards the eye, of AttenuationGrid::kUnit, of the frame `viewedIn`
+  std::vector<LightValue> lights;      ///< of the same frame; empty: unlit
   uint64_t viewedIn = 0;
   uint64_t lastUsed = 0;  ///< call of HeldBricks::nextCall
 
-  uint64_t bytes() const {
-    return codes.capacity() * sizeof(codes[0]) + matter.capacity() * sizeof(matter[0]) +
-           cover.capacity() * sizeof(cover[0]) + attenuations.capacity() * sizeof(attenuations[0]) +
-           lights.capacity() * sizeof(lights[0]);
-  }
+  uint64_t bytes() const;
 };
 
 /// By a number that its user makes of level and position.

@@ -50,6 +50,11 @@ Towards towardsLamp(const Placement& placement, const Light& lamp) {
   return lamp.directional ? Towards::direction(placement, lamp.world) : Towards::point(placement, lamp.world);
 }
 
+/// What is stored is traced near voxels for cells; kernels leave out a voxel's own matter.
+bool hasNearField(AttenuationSource source, Footprint footprint) {
+  return source == AttenuationSource::stored && footprint == Footprint::cell;
+}
+
 StoredLookup lookupOf(AttenuationSource source) {
   return source == AttenuationSource::quotient ? StoredLookup::quotient : StoredLookup::interpolated;
 }
@@ -112,7 +117,7 @@ struct Splatter::State {
   KeptCanvas canvas;
   // Made when first needed.
   std::optional<ValueGrid> own;
-  std::optional<VisibleCubes> cubes;
+  std::optional<VisibleCubes> cubes, nearCubes;
   std::optional<CoarseVolume> coarse;
   std::optional<AbsentBricks> absent;             ///< bricks that the file lacks
   HeldBricks bricks;                              ///< what of the file is in memory
@@ -166,6 +171,9 @@ struct Splatter::State {
   StoredTarget storedTarget(Frame& to, const Towards& target, AttenuationSource source, bool nearest);
   void lookIntoGrids(Frame& to, const Towards& eye, AttenuationSource source);
   void lookIntoFile(Frame& to, const Towards& eye, AttenuationSource source);
+  /// Bytes of a frame's arrays of the whole volume, and of the picture.
+  uint64_t gridBytes(const SplatOptions& options, AttenuationSource source) const;
+  static uint64_t pictureBytes(const Camera& camera);
   /// Throws MachineError if that is too little.
   void shareMemory(Frame& to, uint64_t fixedBytes, uint64_t bytesPerBlock, uint64_t& sourceBytes) const;
   LightGrid lightVoxels(const Camera& camera, const SplatOptions& options, SplatStatistics& statistics);
@@ -269,8 +277,10 @@ AttenuationGrid Splatter::State::attenuationTowards(const Towards& target, Atten
   AttenuationGrid result = storedAttenuation(*file, target, lookupOf(source));
   if (source == AttenuationSource::stored) {
     coarseVolume().correct(target, result);
-    if (footprint == Footprint::cell)
-      result = withNearField(grid(), table, visibleCubes(), target, kNearPlanes, result);
+    if (hasNearField(source, footprint)) {
+      if (!nearCubes) nearCubes = findNearCubes(grid(), *visibility);
+      result = withNearField(grid(), table, *nearCubes, target, kNearPlanes, result);
+    }
   }
   return result;
 }
@@ -314,18 +324,31 @@ LightGrid Splatter::State::lightVoxels(const Camera& camera, const SplatOptions&
   return lightGrid(grid(), visibleCubes(), file, options.lighting, camera, lamps);
 }
 
+uint64_t Splatter::State::gridBytes(const SplatOptions& options, AttenuationSource source) const {
+  // Codes and attenuation, of which the near field makes another; light, and attenuation towards each lamp.
+  uint64_t perVoxel = (hasNearField(source, options.footprint) ? 3 : 2) * sizeof(uint16_t);
+  if (!options.lighting.unlit()) {
+    perVoxel += sizeof(LightValue) + options.lighting.lights.size() * sizeof(uint16_t);
+  }
+  return voxelCount(dims) * perVoxel;
+}
+
+uint64_t Splatter::State::pictureBytes(const Camera& camera) {
+  const uint64_t pixels = uint64_t(camera.imageSize.x) * uint64_t(camera.imageSize.y);
+  // Rays, and sums as they are drawn, read back and resolved.
+  return pixels * (sizeof(PixelRay) + 4 * kSumChannels * sizeof(float));
+}
+
 void Splatter::State::shareMemory(Frame& to, uint64_t fixedBytes, uint64_t bytesPerBlock, uint64_t& sourceBytes) const {
   const uint64_t allowed = to.options.memoryBytes;
   sourceBytes = UINT64_MAX;
   if (allowed == 0) return;
-  const uint64_t pixels = uint64_t(to.camera.imageSize.x) * uint64_t(to.camera.imageSize.y);
-  // Rays, and sums as they are drawn, read back and resolved.
-  fixedBytes += pixels * (sizeof(PixelRay) + 4 * kSumChannels * sizeof(float));
+  fixedBytes += pictureBytes(to.camera);
   const uint64_t perBlock = bytesPerBlock + cpuCanvasBytes(blockEdge);
   if (allowed < fixedBytes + perBlock) {
     throw MachineError(
-        fmt::format("this picture needs {} bytes of memory, {} are allowed; allow more, make it smaller, or take "
-                    "--attenuation interpolated",
+        fmt::format("this picture needs {} bytes of memory, {} are allowed; allow more, or make it smaller (swept and "
+                    "pinned attenuation need more than stored does)",
                     fixedBytes + perBlock, allowed));
   }
   const uint64_t rest = allowed - fixedBytes;
@@ -340,8 +363,7 @@ void Splatter::State::lookIntoGrids(Frame& to, const Towards& eye, AttenuationSo
         "interpolated");
   }
   uint64_t sourceBytes = 0;
-  const uint64_t perVoxel = 2 * sizeof(uint16_t) + (to.options.lighting.unlit() ? 0 : sizeof(LightValue));
-  shareMemory(to, voxelCount(dims) * perVoxel, 0, sourceBytes);
+  shareMemory(to, gridBytes(to.options, source), 0, sourceBytes);
   to.attenuation = attenuationTowards(eye, source, to.options.footprint);
   const Clock::time_point lightStart = Clock::now();
   to.light = lightVoxels(to.camera, to.options, to.statistics);
@@ -356,6 +378,7 @@ StoredTarget Splatter::State::storedTarget(Frame& to, const Towards& target, Att
   if (source == AttenuationSource::stored) {
     to.ratios.push_back(std::make_unique<CoarseRatio>(coarseVolume().ratio(target)));
     result.ratio = to.ratios.back().get();
+    result.nearField = hasNearField(source, to.options.footprint);
   }
   return result;
 }
@@ -364,6 +387,8 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
   const SplatOptions& options = to.options;
   FileBlockSource::View look;
   look.cells = options.footprint == Footprint::cell;
+  look.table = &table;
+  look.visibility = &*visibility;
   look.white = std::all_of(transfer.points.begin(), transfer.points.end(),
                            [](const TransferPoint& point) { return point.srgb == glm::dvec3(1.0); });
   if ((options.lodPixels > 0.0 || to.allLevels) && file->levels() > 1 && !look.white &&
@@ -386,10 +411,9 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
       const AttenuationSource ofLamp = chosen(options.lightAttenuation, target, true);
       to.statistics.lightAttenuation = attenuationSourceName(ofLamp);
       LampSource lamp;
-      // What is traced near the voxel, and what is pinned or swept, is of the whole volume.
-      const bool nearField = ofLamp == AttenuationSource::stored && options.footprint == Footprint::cell;
-      if (ofLamp == AttenuationSource::swept || ofLamp == AttenuationSource::pinned ||
-          (nearField && options.lodPixels == 0.0)) {
+      // What is pinned or swept is of the whole volume. What is stored may be: it then serves later frames too.
+      const bool kept = options.lodPixels == 0.0 && options.memoryBytes == 0 && hasNearField(ofLamp, options.footprint);
+      if (ofLamp == AttenuationSource::swept || ofLamp == AttenuationSource::pinned || kept) {
         to.lampGrids[i] = lampGrid(target, ofLamp, options.footprint);
         lamp.swept = to.lampGrids[i].get();
         fixedBytes += voxelCount(dims) * sizeof(uint16_t);
@@ -404,10 +428,7 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
   for (const auto& ratio : to.ratios)
     fixedBytes += ratio->bytes();
   uint64_t sourceBytes = 0;
-  shareMemory(to, fixedBytes,
-              FileBlockSource::bytesPerBlock(blockEdge, file->brickEdge(), look.lighting != nullptr,
-                                             look.lighting != nullptr && look.lighting->shaded()),
-              sourceBytes);
+  shareMemory(to, fixedBytes, FileBlockSource::bytesPerBlock(blockEdge, file->brickEdge(), look), sourceBytes);
   to.source = std::make_unique<FileBlockSource>(*file, std::move(look), absent, bricks, blockEdge, sourceBytes);
   if (options.lodPixels > 0.0) {
     findLevels();
@@ -456,10 +477,14 @@ void Splatter::prepareFrame(const Camera& camera, const SplatOptions& options, b
   }
   source = state.chosen(source, eye, false);
   statistics.attenuation = attenuationSourceName(source);
-  // What is swept, or traced near the voxel, is an array of the whole volume.
-  const bool nearField = source == AttenuationSource::stored && options.footprint == Footprint::cell;
+  // What is swept or pinned is an array of the whole volume; so is all else where there is room, which for a whole
+  // picture is faster than bricks.
+  const bool nearField = hasNearField(source, options.footprint);
+  const bool fits = options.memoryBytes == 0 || options.memoryBytes >= state.gridBytes(options, source) +
+                                                                           State::pictureBytes(camera) +
+                                                                           cpuCanvasBytes(state.blockEdge);
   if (source == AttenuationSource::swept || source == AttenuationSource::pinned ||
-      (nearField && options.lodPixels == 0.0)) {
+      (nearField && options.lodPixels == 0.0 && !options.blockwise && fits)) {
     std::unique_ptr<BlockSource> coarser;
     if (allLevels && nearField) {
       state.lookIntoFile(*frame, eye, source);

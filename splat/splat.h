@@ -68,6 +68,9 @@ struct SplatOptions {
   /// Bytes that may be taken by buffers and textures, and by everything else whose size depends on volume or image; 0:
   /// as many as there are. Neither changes a bit of the result.
   uint64_t gpuMemoryBytes = 0, memoryBytes = 0;
+  /// Stored attenuation is looked up for the blocks that are drawn and not for the whole volume at once, as it is
+  /// anyway with lodPixels or where memory is short: for who draws a share of them. The bits are the same.
+  bool blockwise = false;
   float firstQuantum = 0x1p-20f;  ///< raised by 4 until the sums prove exact; a power of two
 };
 

@@ -67,6 +67,7 @@ void addShadows(Table& table, const Scene& scene, const TableOptions& options) {
   const AttenuationFile file = attenuationFile(scene, Classification::preintegrated, options.folders);
   const ClassificationTable classification = classificationTable(scene.transfer, scene.grid.coding);
   const VisibleCubes cubes = findVisibleCubes(scene.grid, scene.transfer);
+  const VisibleCubes nearCubes = findNearCubes(scene.grid, CodeVisibility(scene.transfer, scene.grid.coding));
   const CoarseVolume coarse(scene.grid, ofCode);
   const Box box = scene.bounds();
   const double size = glm::length(box.extent());
@@ -92,7 +93,8 @@ void addShadows(Table& table, const Scene& scene, const TableOptions& options) {
       row.push_back(fmt::format("{:.1f}", shadowPsnr(samples, stored, marched)));
       row.push_back(fmt::format(
           "{:.1f}",
-          shadowPsnr(samples, withNearField(scene.grid, classification, cubes, target, kNearPlanes, stored), marched)));
+          shadowPsnr(samples, withNearField(scene.grid, classification, nearCubes, target, kNearPlanes, stored),
+                     marched)));
     }
     row.push_back(fmt::format("{:.1f}", shadowPsnr(samples, swept, marched)));
     table.rows.push_back(row);

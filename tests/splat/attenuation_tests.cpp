@@ -123,7 +123,7 @@ TEST(SweptAttenuation, AgreesWithMarchedRaysBetterThanStored) {
 TEST(NearField, ThroughTheWholeVolumeIsAMarchedRay) {
   const Scene scene = waves();
   const ValueGrid grid = scene.grid();
-  const VisibleCubes cubes = findVisibleCubes(grid, scene.transfer);
+  const VisibleCubes cubes = findNearCubes(grid, CodeVisibility(scene.transfer, grid.coding));
   AttenuationGrid far;
   far.values.assign(grid.codes.size(), 7);
   for (const Towards& target :

@@ -211,6 +211,33 @@ TEST(Levels, SameBitsWhateverTheOrderBackendAndMemory) {
   }
 }
 
+// Near fields are traced brick by brick then, and not in arrays of the whole volume.
+TEST(Levels, CutOfTheFinestLevelHasTheBitsOfTheDirectPicture) {
+  const Scene scene = lumps();
+  SplatOptions lit, shaded;
+  lit.lighting.lights = {{true, {1.0, 2.0, 1.0}, {1.0f, 0.8f, 0.5f}}, {false, {90.0, -40.0, 20.0}, {0.2f, 0.5f, 1.0f}}};
+  shaded.lighting = lit.lighting;
+  shaded.lighting.ambient = 0.2f;
+  shaded.lighting.shading = Shading::phong;
+  for (SplatOptions options : {SplatOptions{}, lit, shaded}) {
+    const Camera camera = alongView(scene, {64, 47});
+    for (const int blockEdge : {16, 32}) {
+      Splatter splatter(*scene.file, scene.transfer, Backend::cpu, blockEdge);
+      options.lodPixels = 0.0;
+      options.memoryBytes = 0;
+      const SplatResult direct = splatter.render(camera, options, silentProgress());
+      ASSERT_EQ(direct.statistics.attenuation, "stored");
+      options.lodPixels = 1e-3;
+      const SplatResult cut = splatter.render(camera, options, silentProgress());
+      EXPECT_TRUE(sameSums(cut, direct))
+          << compareImages(resolve(cut.sums, Formula::normalised), resolve(direct.sums, Formula::normalised)).psnr;
+      EXPECT_EQ(levelsDrawn(cut.statistics), 1);
+      options.memoryBytes = uint64_t(24) << 20;
+      EXPECT_TRUE(sameSums(splatter.render(camera, options, silentProgress()), direct));
+    }
+  }
+}
+
 // A splatter keeps bricks and its canvas from frame to frame.
 TEST(Levels, FramesDoNotDependOnThoseBefore) {
   const Scene scene = lumps();
