@@ -107,7 +107,7 @@ $(section refinement)
 ## Frame time and PSNR over --lod
 
 512 x 512, one view, the C++ backend, median of 5. Where all blocks are of the finest level the picture is that of \`--lod 0\`
-to the last bit (999 dB), though near fields are then traced brick by brick.
+to the last bit, though near fields are then traced brick by brick.
 
 $(section detail)
 
