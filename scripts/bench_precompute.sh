@@ -30,8 +30,8 @@ mkdir -p docs/results
 
 A line is the 64 bytes of one direction that are coded and stored together. The ratio to memset is missed: 0.35 of a memset of 38 GB/s
 by two threads leaves each 9.6 ns a line. The host decides how much that is: the same program on the same two cores takes 11.5 to 13 ns
-a line in one quarter of an hour and 15 to 19 in another (a tile that stays in the nearest cache 4.0 or 5.7), while memset hardly
-changes, so only parts and variants of the same minutes can be compared.
+a line in one quarter of an hour and 15 to 20 in another (a tile that stays in the nearest cache 4.0 or 5.7), memset does 38 to 40 or
+31 to 34 GB/s and streaming stores 33 to 37 or 24 to 26, so only parts and variants of the same minutes can be compared.
 
 By leaving parts out, 256^3 `noise`, two threads, nothing else running, least of 9 sweeps, two rounds in a good quarter of an hour:
 
