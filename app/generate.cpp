@@ -1,5 +1,5 @@
 // freevoxel generate: volumes made by formula.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <memory>

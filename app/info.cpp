@@ -1,5 +1,5 @@
 // freevoxel info: what is in a file.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>
@@ -109,6 +109,7 @@ nlohmann::ordered_json describe(const AttenuationFile& file, Histogram& histogra
   json["valueBytesPerVoxel"] = per(file.codeBytes(), voxels);
   json["attenuationBytesPerVoxel"] = per(file.attenuationBytes(), voxels);
   json["levelBytesPerVoxel"] = per(file.levelBytes(), voxels);
+  json["pinBytesPerVoxel"] = per(file.pinned().bytes(), voxels);
   json["valueBytesPerStoredVoxel"] = per(file.codeBytes(), file.storedVoxels());
   json["attenuationBytesPerStoredVoxel"] = per(file.attenuationBytes(), file.storedVoxels());
   return json;
@@ -204,12 +205,13 @@ Outcome info(const InfoOptions& options, Session& session) {
     session.statistics["bytesPerVoxel"] = double(file.fileBytes()) / double(voxels);
     remarks = fmt::format(
         "attenuation file: {} voxels, {:.1f} % stored, {} visible\n"
-        "bytes per voxel of the volume: {:.3g}, of which values {:.3g}, attenuation {:.3g}; "
-        "per stored voxel: values {:.3g}, attenuation {:.3g}\n"
+        "bytes per voxel of the volume: {:.3g}, of which values {:.3g}, attenuation {:.3g}, coarser levels {:.3g}, "
+        "pins {:.3g}; per stored voxel: values {:.3g}, attenuation {:.3g}\n"
         "made by: {}\nsum and values: of stored voxels, as coded\n",
         voxels, 100.0 * double(file.storedVoxels()) / double(voxels), file.visibleVoxels(),
         double(file.fileBytes()) / double(voxels), json["valueBytesPerVoxel"].get<double>(),
-        json["attenuationBytesPerVoxel"].get<double>(), json["valueBytesPerStoredVoxel"].get<double>(),
+        json["attenuationBytesPerVoxel"].get<double>(), json["levelBytesPerVoxel"].get<double>(),
+        json["pinBytesPerVoxel"].get<double>(), json["valueBytesPerStoredVoxel"].get<double>(),
         json["attenuationBytesPerStoredVoxel"].get<double>(), file.command());
   } else if (isMeshFile(options.input) || (isSphereFile(options.input) && !isVolumeArray(options.input))) {
     if (hasVolumeOptions(options.raw)) throw UsageError("options for raw volumes make no sense for meshes and spheres");
@@ -251,8 +253,10 @@ Command addInfo(CLI::App& program, CommonOptions& common) {
       "nonFinite, fileBytes; for an attenuation "
       "file also layout, classification, levels, hierarchy, bricks, pins (each a direction or a position, world), "
       "pinBytes, storedVoxels, occupancy (their share), "
-      "valueBytes, attenuationBytes (both of the finest level), levelBytes (of all others), and these per voxel of the "
-      "volume (...PerVoxel) and the first two per stored voxel (...PerStoredVoxel) (there sum is over stored voxels); "
+      "valueBytes, attenuationBytes (both of the finest level), levelBytes (of all others), these and pinBytes per "
+      "voxel "
+      "of the volume (...PerVoxel) and the first two per stored voxel (...PerStoredVoxel) (there sum is over stored "
+      "voxels); "
       "of meshes and spheres what is in them, what "
       "was left out, and the first 64 materials");
   addVolumeOptions(*command, options->raw);

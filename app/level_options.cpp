@@ -1,7 +1,5 @@
 #include "app/level_options.h"
 
-#include <algorithm>
-
 #include "app/options.h"
 #include "app/parse.h"
 #include "base/error.h"
@@ -34,10 +32,12 @@ void addLevelOptions(CLI::App& command, SplatOptions& options) {
                       "the most that OpenGL's buffers and textures may take, e.g. 64M; blocks stream through them "
                       "(default: as much as is useful). The bits are the same",
                       parseSomeMemory);
-  addParsed<uint64_t>(command, "--memory", options.memoryBytes, "BYTES",
-                      "the most memory to take, e.g. 1G; bricks of an attenuation file are read again rather than kept "
-                      "(default: as much as is useful). The bits are the same",
-                      parseSomeMemory);
+  addParsed<uint64_t>(
+      command, "--memory", options.memoryBytes, "BYTES",
+      "the most memory to take, e.g. 1G; bricks of an attenuation file are read again rather than kept "
+      "(default: as much as is useful). The program and its libraries take about 180M of it, and OpenGL "
+      "more where it runs on the processor. The bits are the same",
+      parseSomeMemory);
 }
 
 void reportLevels(const SplatStatistics& statistics, Session& session) {
@@ -46,11 +46,6 @@ void reportLevels(const SplatStatistics& statistics, Session& session) {
   session.statistics["splatsOfLevel"] = statistics.splatsOfLevel;
   session.statistics["volumeBytes"] = statistics.volumeBytes;
   if (statistics.glBytes > 0) session.statistics["glBytes"] = statistics.glBytes;
-}
-
-uint64_t withoutProgram(uint64_t memoryBytes) {
-  constexpr uint64_t kProgramBytes = uint64_t(128) << 20;
-  return memoryBytes - std::min(memoryBytes / 2, kProgramBytes);
 }
 
 }  // namespace freevoxel

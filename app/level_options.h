@@ -14,7 +14,4 @@ void addLevelOptions(CLI::App& command, SplatOptions& options);
 /// Blocks and splats of each level, and what was left out and why.
 void reportLevels(const SplatStatistics& statistics, Session& session);
 
-/// Of --memory, what the program takes beside volume and image: libraries, threads' stacks, tables.
-uint64_t withoutProgram(uint64_t memoryBytes);
-
 }  // namespace freevoxel

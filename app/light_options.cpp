@@ -1,6 +1,6 @@
 #include "app/light_options.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "app/parse.h"
 

@@ -1,5 +1,5 @@
 // The freevoxel program: parses the command line, runs one command, tells the user of errors.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cstdio>

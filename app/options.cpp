@@ -1,6 +1,6 @@
 #include "app/options.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <numbers>
 

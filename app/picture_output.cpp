@@ -1,6 +1,6 @@
 #include "app/picture_output.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include "app/input_file.h"
 #include "app/parse.h"

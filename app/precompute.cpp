@@ -1,7 +1,7 @@
 // freevoxel precompute: from a volume and a transfer function to an attenuation file.
 #include "precompute/precompute.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,5 @@
 // freevoxel render: a picture of an attenuation file or a volume.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <chrono>
 #include <filesystem>
@@ -13,6 +13,8 @@
 #include "app/light_options.h"
 #include "app/picture_output.h"
 #include "app/precompute_report.h"
+#include "app/program_memory.h"
+#include "app/progressive_folder.h"
 #include "app/scene_file.h"
 #include "app/shared_drawing.h"
 #include "base/atomic_file.h"
@@ -217,13 +219,15 @@ void drawRays(const ValueGrid& grid, const TransferFunction& transfer, const Ren
 /// The picture, and those before it in a folder of their own.
 void drawProgressively(Splatter& splatter, const Box& bounds, const AttenuationFile& file, const RenderOptions& options,
                        Session& session) {
-  std::error_code problem;
-  std::filesystem::create_directories(options.progressive, problem);
-  if (problem) throw MachineError(fmt::format("{}: cannot be made: {}", options.progressive, problem.message()));
+  const std::vector<std::filesystem::path> earlier = picturesOfEarlierRun(options.progressive);
   const Formula formula = splatFormula(options.formula);
   drawFrames(options, bounds, session, [&](const Camera& camera, std::optional<Sums>& sums) {
     size_t pictures = 0;
     const auto show = [&](size_t n, const Sums& shown) {
+      if (n == 0 && !earlier.empty()) {
+        session.tell(fmt::format("{}: removing {} pictures of an earlier run", options.progressive, earlier.size()));
+        removeAll(earlier);
+      }
       PictureOptions output = options.picture;
       output.output = (std::filesystem::path(options.progressive) /
                        fmt::format("{:02}{}", n, std::filesystem::path(options.picture.output).extension().string()))
@@ -246,7 +250,6 @@ void drawSplats(const ValueGrid* grid, const AttenuationFile* file, TransferFunc
                 Session& session) {
   const glm::ivec3 dims = grid != nullptr ? grid->dims : file->dims();
   const Box bounds = worldBounds(grid != nullptr ? grid->placement : file->placement(), dims);
-  if (options.splat.memoryBytes > 0) options.splat.memoryBytes = withoutProgram(options.splat.memoryBytes);
   expectSameOnAllRanks(session.ranks(),
                        file != nullptr ? file->identity() : contentHash(std::as_bytes(std::span(grid->codes))),
                        options.input);
@@ -258,6 +261,11 @@ void drawSplats(const ValueGrid* grid, const AttenuationFile* file, TransferFunc
     return grid != nullptr ? Splatter(*grid, file, transfer, options.backend)
                            : Splatter(*file, transfer, options.backend);
   });
+  if (options.splat.memoryBytes > 0) {
+    // What the grid has claimed counts as data, in Splatter.
+    const uint64_t gridBytes = grid != nullptr ? grid->codes.size() * sizeof(grid->codes[0]) : 0;
+    options.splat.memoryBytes = memoryForData(options.splat.memoryBytes, kImageLibraryBytes) + gridBytes;
+  }
   if (options.formula == PictureFormula::blended) {
     drawFrames(options, bounds, session, [&](const Camera& camera, std::optional<Sums>&) {
       BlendedResult result = splatter.renderBlended(camera, options.blendKernel, options.splat, session.progress());
@@ -438,7 +446,8 @@ Command addRender(CLI::App& program, CommonOptions& common) {
       ->add_option(
           "--progressive", options->progressive,
           "of an attenuation file with levels: also write the pictures that become this one, 00.png and so on, "
-          "from the coarsest level on; blocks are taken back and finer ones added, exactly")
+          "from the coarsest level on; blocks are taken back and finer ones added, exactly. Pictures of an earlier run "
+          "in the folder are removed; any other file named so is an error")
       ->type_name("FOLDER");
   addBackgroundOption(*command, options->picture);
   addCameraOptions(*command, options->camera);

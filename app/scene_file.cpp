@@ -1,6 +1,6 @@
 #include "app/scene_file.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 

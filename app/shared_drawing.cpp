@@ -1,6 +1,6 @@
 #include "app/shared_drawing.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // freevoxel sheet: pictures side by side.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <memory>

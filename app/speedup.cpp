@@ -1,5 +1,5 @@
 // freevoxel speedup: how much faster several ranks draw a picture (papers/freevoxels Fig. 8; DESIGN section 9).
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <time.h>
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // freevoxel trace: a picture of volumes, meshes and spheres in per-voxel lists, by rays.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <chrono>
 #include <memory>

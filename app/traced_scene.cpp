@@ -1,6 +1,6 @@
 #include "app/traced_scene.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>

@@ -1,5 +1,5 @@
 // freevoxel transfer: what a transfer function does to a volume, as a picture or as JSON.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <memory>
 

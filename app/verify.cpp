@@ -1,5 +1,5 @@
 // freevoxel verify: is every byte of a file as it was written?
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <memory>
 

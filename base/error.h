@@ -1,7 +1,7 @@
 // The three kinds of error. Library code throws them; only app/ prints or exits.
 #pragma once
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <stdexcept>
 #include <string>

@@ -1,6 +1,6 @@
 // The composite against one MPI_Reduce of whole images, run under mpirun: interleaved, the sums compared bit by bit
 // first.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <malloc.h>
 
 #include <CLI/CLI.hpp>

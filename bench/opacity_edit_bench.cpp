@@ -1,6 +1,6 @@
 // From an opacity edit to the new picture, stage by stage, for a volume of bytes that is already open. Prints a
 // Markdown table; arguments: edges of the volume, 256 if there are none. Threads as OMP_NUM_THREADS says.
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <omp.h>
 
 #include <algorithm>

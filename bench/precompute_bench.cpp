@@ -1,7 +1,7 @@
 // How fast all 26 directions are swept into brick planes in memory, beside what the memory takes at all in the same
 // run. Prints a Markdown table; arguments: edges of the volume, 128 256 512 if there are none.
 #include <emmintrin.h>
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <omp.h>
 
 #include <algorithm>

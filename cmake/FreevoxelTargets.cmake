@@ -44,6 +44,8 @@ if(FREEVOXEL_SANITIZE)
   target_compile_options(freevoxel_settings INTERFACE
     -fsanitize=address,undefined -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(freevoxel_settings INTERFACE -fsanitize=address,undefined)
+  # Highway's oldest instruction sets are the release build's matter: each takes as long to compile as the one that runs.
+  target_compile_definitions(freevoxel_settings INTERFACE "HWY_DISABLED_TARGETS=(HWY_SSSE3|HWY_SSE4)")
 endif()
 target_link_libraries(freevoxel_settings INTERFACE Threads::Threads)
 
@@ -54,13 +56,15 @@ function(freevoxel_library name)
   target_link_libraries(freevoxel_${name} PUBLIC freevoxel_settings ${arg_LINKS})
 endfunction()
 
-# freevoxel_test(NAME SOURCES ... LINKS ... [LABELS label] [SEPARATE]): a GoogleTest program; every case of it is a CTest
-# test (FREEVOXEL_TEST_SHARDS apart).
-# Tests labelled "quick" also run under the sanitizers, those labelled "full" only in scripts/test_full.sh. (One label:
-# gtest_discover_tests would take a second one, or an empty one, for the next property.) SEPARATE: files are compiled one
-# by one, since several define the same names.
+add_custom_target(quick_tests)
+
+# freevoxel_test(NAME SOURCES ... LINKS ... [LABELS label]): a GoogleTest program; every case of it is a CTest test
+# (FREEVOXEL_TEST_SHARDS apart).
+# Tests labelled "quick" also run under the sanitizers (target quick_tests builds them and what they need), those labelled
+# "full" only in scripts/test_full.sh. (One label: gtest_discover_tests would take a second one, or an empty one, for the
+# next property.) Files that define the same names have a namespace of their own, since several are compiled at a time.
 function(freevoxel_test name)
-  cmake_parse_arguments(arg "SEPARATE" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
+  cmake_parse_arguments(arg "" "TIMEOUT" "SOURCES;LINKS;LABELS" ${ARGN})
   if(NOT arg_TIMEOUT)
     set(arg_TIMEOUT 600)
   endif()
@@ -68,9 +72,10 @@ function(freevoxel_test name)
     set(labels LABELS ${arg_LABELS})
   endif()
   add_executable(${name} ${arg_SOURCES})
-  if(NOT arg_SEPARATE)
-    set_target_properties(${name} PROPERTIES UNITY_BUILD ${FREEVOXEL_JOIN_SOURCES} UNITY_BUILD_BATCH_SIZE 5)
+  if(arg_LABELS STREQUAL "quick")
+    add_dependencies(quick_tests ${name})
   endif()
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${FREEVOXEL_JOIN_SOURCES} UNITY_BUILD_BATCH_SIZE 5)
   # Tests wait for what they test, not for themselves. A fixture may live in an unnamed namespace (gcc only warns of it
   # where files are joined).
   target_compile_options(${name} PRIVATE -O1 $<$<CXX_COMPILER_ID:GNU>:-Wno-subobject-linkage>)

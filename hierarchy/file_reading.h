@@ -1,7 +1,7 @@
 // What the parts of the reader share: errors that name file, offset, expected and found, and copies out of the map.
 #pragma once
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <cstddef>
 #include <cstdint>

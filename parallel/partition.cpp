@@ -1,6 +1,6 @@
 #include "parallel/partition.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <charconv>

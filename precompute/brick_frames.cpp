@@ -1,6 +1,6 @@
 #include "precompute/brick_frames.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <zstd.h>
 
 #include <algorithm>

@@ -18,11 +18,12 @@ cat <<'TEXT'
 
 Bytes per voxel of the volume, directories and transfer function left out; written by `scripts/attenuation_sizes.sh`,
 with the transfer functions of `examples/transfer/`, `preintegrated` (labels: `voxel`). *Occupied*: voxels in stored
-bricks of 16^3. *Apart*: PSNR in dB between pictures from `dense` and from `compact` with bricks of 16^3, formula
-`direct`, 500 x 400, `--orbit 40,25`.
+bricks of 16^3. *Levels*: all coarser ones together (`--levels 0`), *pin*: one direction (`--pin-direction 1,1,1`); both
+are the same in either layout. *Apart*: PSNR in dB between pictures from `dense` and from `compact` with bricks of 16^3,
+formula `direct`, 500 x 400, `--orbit 40,25`.
 
-| volume | voxels | occupied | attenuation dense 16 | compact 16 | compact 32 | values dense 16 | compact 16 | compact 32 | apart |
-|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|
+| volume | voxels | occupied | attenuation dense 16 | compact 16 | compact 32 | values dense 16 | compact 16 | compact 32 | levels 16 | 32 | pin 16 | 32 | apart |
+|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|
 TEXT
 
 row() { # NAME FILE-AND-OPTIONS TRANSFER
@@ -32,7 +33,7 @@ row() { # NAME FILE-AND-OPTIONS TRANSFER
   for name in dense-16 compact-16 compact-32; do
     layout=${name%-*} edge=${name#*-}
     "$program" precompute "${volume[@]}" --transfer "$transfers/$3" --layout "$layout" --brick "$edge" --quiet \
-      -o "$folder/$name.fvx"
+      --levels 0 --pin-direction 1,1,1 -o "$folder/$name.fvx"
     "$program" info --json "$folder/$name.fvx" >"$folder/$name.json"
   done
   for layout in dense compact; do
@@ -51,10 +52,14 @@ row() { # NAME FILE-AND-OPTIONS TRANSFER
     -v c="$(number attenuationBytesPerVoxel "$folder/compact-32.json")" \
     -v d="$(number valueBytesPerVoxel "$folder/dense-16.json")" \
     -v e="$(number valueBytesPerVoxel "$folder/compact-16.json")" \
-    -v f="$(number valueBytesPerVoxel "$folder/compact-32.json")" 'BEGIN {
+    -v f="$(number valueBytesPerVoxel "$folder/compact-32.json")" \
+    -v g="$(number levelBytesPerVoxel "$folder/compact-16.json")" \
+    -v h="$(number levelBytesPerVoxel "$folder/compact-32.json")" \
+    -v i="$(number pinBytesPerVoxel "$folder/compact-16.json")" \
+    -v j="$(number pinBytesPerVoxel "$folder/compact-32.json")" 'BEGIN {
       if (apart + 0 > 0) apart = sprintf("%.1f", apart)
-      printf "| %s | %s | %.1f %% | %.2f | %.3f | %.3f | %.2f | %.3f | %.3f | %s |\n",
-        name, dims, 100 * occupancy, a, b, c, d, e, f, apart }'
+      printf "| %s | %s | %.1f %% | %.2f | %.3f | %.3f | %.2f | %.3f | %.3f | %.3f | %.3f | %.3f | %.3f | %s |\n",
+        name, dims, 100 * occupancy, a, b, c, d, e, f, g, h, i, j, apart }'
   rm -f "$folder"/*.fvx
 }
 

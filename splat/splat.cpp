@@ -346,10 +346,10 @@ void Splatter::State::shareMemory(Frame& to, uint64_t fixedBytes, uint64_t bytes
   fixedBytes += pictureBytes(to.camera);
   const uint64_t perBlock = bytesPerBlock + cpuCanvasBytes(blockEdge);
   if (allowed < fixedBytes + perBlock) {
-    throw MachineError(
-        fmt::format("this picture needs {} bytes of memory, {} are allowed; allow more, or make it smaller (swept and "
-                    "pinned attenuation need more than stored does)",
-                    fixedBytes + perBlock, allowed));
+    throw MachineError(fmt::format(
+        "this picture needs {} bytes of memory beside the program, {} are left for it; allow more, or make it "
+        "smaller (swept and pinned attenuation need more than stored does)",
+        fixedBytes + perBlock, allowed));
   }
   const uint64_t rest = allowed - fixedBytes;
   to.blocksAtATime = size_t(std::clamp<uint64_t>(rest / 2 / perBlock, 1, to.blocksAtATime));

@@ -1,6 +1,6 @@
 #include "volume/file_pattern.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <filesystem>

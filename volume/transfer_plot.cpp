@@ -1,6 +1,6 @@
 #include "volume/transfer_plot.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <array>

@@ -1,5 +1,5 @@
 // Measures how far pictures and shadows are from ray casting, and writes the tables of docs/results.
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
 #include <cstdio>

@@ -1,6 +1,6 @@
 #include "bench/fidelity/measured.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 

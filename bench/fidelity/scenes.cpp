@@ -1,6 +1,6 @@
 #include "bench/fidelity/scenes.h"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 #include <xxhash.h>
 
 #include <cmath>

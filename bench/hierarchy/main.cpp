@@ -1,5 +1,5 @@
 // Measures what levels of detail are worth and what they cost (docs/results/hierarchy.md).
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>

@@ -129,17 +129,20 @@ TEST(ImageFile, failedWriteLeavesNothing) {
   EXPECT_TRUE(test::listFolder(folder).empty());
 }
 
-/// Reading must throw an InputError of one line or, where the damage hides in unread bytes, give an image.
-void expectGracefulRead(const std::string& path, const std::string& what) {
+/// Reading must throw an InputError of one line or, where the damage hides in unread bytes, give an image. Whether it
+/// threw.
+bool expectGracefulRead(const std::string& path, const std::string& what) {
   try {
     readImage(path);
   } catch (const InputError& error) {
     const std::string text = error.what();
     EXPECT_EQ(text.find('\n'), std::string::npos) << text;
     EXPECT_EQ(text.find(path), 0u) << text;
+    return true;
   } catch (const std::exception& error) {
     ADD_FAILURE() << what << ": " << error.what();
   }
+  return false;
 }
 
 /// Every byte, but under the sanitizers only some: there an exception out of OpenEXR takes a tenth of a second.
@@ -164,8 +167,7 @@ TEST_P(DamagedImage, everyTruncationIsRefused) {
   testing::internal::CaptureStderr();
   for (size_t length = 0; length < bytes.size(); length += kDamageStep) {
     test::writeBytes(path, bytes.substr(0, length));
-    EXPECT_THROW(readImage(path), InputError) << length;
-    expectGracefulRead(path, "length " + std::to_string(length));
+    EXPECT_TRUE(expectGracefulRead(path, "length " + std::to_string(length))) << length;
   }
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }

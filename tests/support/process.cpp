@@ -4,6 +4,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <stdlib.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -24,6 +25,8 @@ namespace {
   if (!options.folder.empty() && chdir(options.folder.c_str()) != 0) _exit(126);
   for (const auto& [name, value] : options.environment)
     setenv(name.c_str(), value.c_str(), 1);
+  const rlimit data{options.dataBytes, options.dataBytes};
+  if (options.dataBytes > 0 && setrlimit(RLIMIT_DATA, &data) != 0) _exit(125);
   std::vector<char*> argv;
   for (const std::string& argument : arguments)
     argv.push_back(const_cast<char*>(argument.c_str()));

@@ -1,6 +1,7 @@
 // Runs a program and catches what it says.
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,7 @@ struct ProcessResult {
 struct ProcessOptions {
   std::string folder;                                            ///< working folder; empty = the test's own
   std::vector<std::pair<std::string, std::string>> environment;  ///< added to the test's own
+  uint64_t dataBytes = 0;                                        ///< the most private memory (RLIMIT_DATA); 0: any
   int signal = 0;                                                ///< sent once to the process ...
   double signalAfter = 0.0;                                      ///< ... after this many seconds
 };

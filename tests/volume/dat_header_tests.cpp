@@ -3,7 +3,7 @@
 #include "tests/support/test_data.h"
 #include "tests/volume/volume_files.h"
 
-namespace freevoxel::test {
+namespace freevoxel::test::dat_header_tests {
 
 namespace {
 
@@ -61,4 +61,4 @@ TEST(DatHeader, errorsNameTheLine) {
   EXPECT_NE(error(kHeader + "ObjectFileName: b.raw\n").find("line 4: several data files"), std::string::npos);
 }
 
-}  // namespace freevoxel::test
+}  // namespace freevoxel::test::dat_header_tests

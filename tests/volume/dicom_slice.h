@@ -1,7 +1,7 @@
 // DICOM files put together by hand.
 #pragma once
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <glm/vec3.hpp>
 #include <string>

@@ -5,7 +5,7 @@
 #include "tests/support/test_data.h"
 #include "tests/volume/volume_files.h"
 
-namespace freevoxel::test {
+namespace freevoxel::test::hostile_headers_tests {
 
 namespace {
 
@@ -83,4 +83,4 @@ TEST(HostileHeaders, dat) {
   expectReadOrRefused(folder + "v.dat", header.size());
 }
 
-}  // namespace freevoxel::test
+}  // namespace freevoxel::test::hostile_headers_tests

@@ -117,7 +117,7 @@ TEST_F(ImageStack, truncationsFail) {
   writeSlice<float>(exr, ValueType::f32, oiio::TypeDesc::FLOAT, 0);
   for (const std::string& path : {tiff, exr}) {
     const std::string content = readBytes(path);
-    for (size_t part = 0; part < 8; ++part) {
+    for (const size_t part : {0, 1, 4, 7}) {
       writeBytes(path, content.substr(0, content.size() * part / 8));
       EXPECT_THROW(readVolume(path), InputError) << path << " " << part;
     }

@@ -4,7 +4,7 @@
 #include "tests/support/test_data.h"
 #include "tests/volume/volume_files.h"
 
-namespace freevoxel::test {
+namespace freevoxel::test::legacy_vtk_tests {
 
 namespace {
 
@@ -109,4 +109,4 @@ TEST(LegacyVtk, whatCannotBeIsRefused) {
   EXPECT_NE(error(kBinary).find("no array with a value for every voxel"), std::string::npos);
 }
 
-}  // namespace freevoxel::test
+}  // namespace freevoxel::test::legacy_vtk_tests

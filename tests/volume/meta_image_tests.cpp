@@ -4,7 +4,7 @@
 #include "tests/support/test_data.h"
 #include "tests/volume/volume_files.h"
 
-namespace freevoxel::test {
+namespace freevoxel::test::meta_image_tests {
 
 namespace {
 
@@ -117,4 +117,4 @@ TEST(MetaImage, errorsNameTheLine) {
   EXPECT_NE(error(kStart + type + "ElementDataFile = gone.raw\n").find("line 5: data file"), std::string::npos);
 }
 
-}  // namespace freevoxel::test
+}  // namespace freevoxel::test::meta_image_tests

@@ -4,7 +4,7 @@
 #include "tests/support/test_data.h"
 #include "tests/volume/volume_files.h"
 
-namespace freevoxel::test {
+namespace freevoxel::test::nifti_tests {
 
 namespace {
 
@@ -131,4 +131,4 @@ TEST(Nifti, whatCannotBeIsRefused) {
   EXPECT_NE(error(nifti1(ByteOrder::little, 2, 8).str() + kBytes + "x").find("found 386"), std::string::npos);
 }
 
-}  // namespace freevoxel::test
+}  // namespace freevoxel::test::nifti_tests

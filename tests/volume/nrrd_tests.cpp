@@ -6,7 +6,7 @@
 #include "tests/support/test_data.h"
 #include "tests/volume/volume_files.h"
 
-namespace freevoxel::test {
+namespace freevoxel::test::nrrd_tests {
 
 namespace {
 
@@ -396,4 +396,4 @@ TEST(Nrrd, compressedAsAWhole) {
   EXPECT_NE(NrrdFile(gzip(kByteHeader + "\n" + kBytes), "v.nrrd.gz").error().find("gunzip it"), std::string::npos);
 }
 
-}  // namespace freevoxel::test
+}  // namespace freevoxel::test::nrrd_tests

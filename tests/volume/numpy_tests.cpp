@@ -4,7 +4,7 @@
 #include "tests/support/test_data.h"
 #include "tests/volume/volume_files.h"
 
-namespace freevoxel::test {
+namespace freevoxel::test::numpy_tests {
 
 namespace {
 
@@ -101,4 +101,4 @@ TEST(Numpy, whatCannotBeIsRefused) {
   EXPECT_NE(error("hello").find("expected a NumPy array"), std::string::npos);
 }
 
-}  // namespace freevoxel::test
+}  // namespace freevoxel::test::numpy_tests

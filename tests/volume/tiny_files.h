@@ -19,7 +19,5 @@ inline void PrintTo(const TinyFile& file, std::ostream* out) {
 
 /// Those that our own parsers read.
 std::vector<TinyFile> tinyFiles();
-/// Those that libraries read.
-std::vector<TinyFile> tinyLibraryFiles();
 
 }  // namespace freevoxel::test

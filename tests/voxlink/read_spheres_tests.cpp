@@ -9,7 +9,7 @@
 #include "tests/volume/volume_files.h"
 #include "voxlink/read_spheres.h"
 
-namespace freevoxel::test {
+namespace freevoxel::test::read_spheres_tests {
 
 namespace {
 
@@ -219,4 +219,4 @@ TEST(ReadSpheres, everyTruncationIsRefusedOrSaysSo) {
   wholeLines(kPdb, "a.pdb", 1);
 }
 
-}  // namespace freevoxel::test
+}  // namespace freevoxel::test::read_spheres_tests
