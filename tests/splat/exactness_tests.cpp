@@ -33,8 +33,9 @@ const std::vector<SplatOrder>& orders() {
   return all;
 }
 
-/// Draws in every order, with 1 to 3 threads and on both backends; all must equal the first. Gives that back. On the CPU
-/// each starts anew, attenuation included; a context of OpenGL and its shaders take long to make and serve all orders.
+/// Draws in every order, with 1 to 3 threads and on both backends; all must equal the first. Gives that back. On the
+/// CPU each starts anew, attenuation included; a context of OpenGL and its shaders take long to make and serve all
+/// orders.
 SplatResult expectOneResult(const Scene& scene, const Camera& camera, Formula formula,
                             Footprint footprint = Footprint::kernel,
                             AttenuationSource attenuation = AttenuationSource::automatic, Cull cull = Cull::none) {
