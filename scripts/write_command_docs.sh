@@ -56,7 +56,7 @@ Every command takes `--stats FILE.json` and writes what it did; of these keys th
 | `ranks` | of `trace`: per rank `rank`, `host`, `seconds` (`build`, `trace`), `firstRow`, `rows` of the image, `rays`; of `render`, of several ranks, one entry each: `rank`, `host`, `seconds` (`attenuation`, `light`, `setup`, `draw`, `composite`), `blocks`, `splats`, `fragments`, `pieces`, `sentBytes` (by the composite), `volumeBytes`, `peakMemoryBytes`, all frames together; what stands outside of it are sums (`blocks`, `splats`, `fragments`) or rank 0's |
 | `identical`, `psnr`, `ssim`, `rms`, `maxError`, `differingBytes`, `coveredPixels` | of `compare` |
 | `pictures` | of `--progressive`, the last included |
-| `volumeBytes` | most that values, attenuation and light of the volume took at once: of all of it, or with stored attenuation of the bricks that were needed |
+| `volumeBytes` | most that values, attenuation and light of the volume took at once: of all of it, or of the bricks in memory, those kept from earlier frames included |
 | `peakMemoryBytes` | largest resident memory of the process |
 | `warnings` | what the user was warned of |
 TEXT

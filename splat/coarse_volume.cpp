@@ -20,11 +20,23 @@ constexpr uint32_t kLargestCode = 16383;
 /// Where both attenuations are below this nothing is known about their ratio.
 constexpr float kDark = 0.002f;
 
+/// Fine voxels along the edge of a coarse one.
+int coarseFactor(glm::ivec3 fineDims) {
+  int factor = 2;
+  while (voxelCount((fineDims + (factor - 1)) / factor) > kMostVoxels)
+    factor *= 2;
+  return factor;
+}
+
 }  // namespace
 
-CoarseVolume::CoarseVolume(glm::ivec3 fineDims) : fineDims_(fineDims) {
-  while (voxelCount((fineDims + (factor_ - 1)) / factor_) > kMostVoxels)
-    factor_ *= 2;
+uint64_t CoarseVolume::bytesFor(glm::ivec3 fineDims) {
+  const int factor = coarseFactor(fineDims);
+  return voxelCount((fineDims + (factor - 1)) / factor) *
+         (sizeof(float) * (2 + std::tuple_size_v<decltype(depths_)>)+2 * sizeof(uint16_t));
+}
+
+CoarseVolume::CoarseVolume(glm::ivec3 fineDims) : factor_(coarseFactor(fineDims)), fineDims_(fineDims) {
   grid_.dims = (fineDims + (factor_ - 1)) / factor_;
   extinction_.resize(voxelCount(grid_.dims));
 }

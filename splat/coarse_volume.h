@@ -38,8 +38,8 @@ class CoarseVolume {
   CoarseRatio ratio(const Towards& towards) const;
   /// Multiplies stored attenuation towards a target by the ratio.
   void correct(const Towards& towards, AttenuationGrid& attenuation) const;
-  /// What it takes in memory, about.
-  uint64_t bytes() const { return extinction_.size() * (sizeof(float) * (1 + depths_.size()) + 2 * sizeof(uint16_t)); }
+  /// What the copy of a volume takes in memory, with one ratio, about.
+  static uint64_t bytesFor(glm::ivec3 fineDims);
 
  private:
   explicit CoarseVolume(glm::ivec3 fineDims);

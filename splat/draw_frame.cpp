@@ -121,9 +121,15 @@ Image drawCells(const FrameDrawing& frame, std::span<const VisibleBlock> blocks,
   statistics.setupSeconds += secondsSince(setupStart);
   const Clock::time_point drawStart = Clock::now();
   CellCounts counts;
-  canvas.clear();
-  canvas.draw(cells, blocks, counts);
-  Image sums = canvas.wholeQuanta();
+  Image sums;
+  try {
+    canvas.clear();
+    canvas.draw(cells, blocks, counts);
+    sums = canvas.wholeQuanta();
+  } catch (...) {
+    frame.canvas->canvas.reset();  // it may be half made
+    throw;
+  }
   statistics.blocks += counts.blocks;
   statistics.splats += counts.blocks;
   for (size_t level = 0; level < counts.blocksOfLevel.size(); ++level) {

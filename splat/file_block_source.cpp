@@ -204,10 +204,15 @@ void FileBlockSource::prepare(std::span<const VisibleBlock> blocks) {
   FirstException failure;
   // In rounds, since shading looks at neighbours' values, and near fields at their attenuation too.
   const auto readAll = [&](const std::vector<std::pair<Place, HeldBrick*>>& bricks, auto read) {
+    std::vector<uint64_t> before;
+    for (const auto& [place, brick] : bricks)
+      before.push_back(brick->bytes());
 #pragma omp parallel for schedule(dynamic, 1)
     for (int64_t i = 0; i < int64_t(bricks.size()); ++i)
       failure.guard([&] { (this->*read)(bricks[size_t(i)].first, *bricks[size_t(i)].second); });
     failure.rethrow();
+    for (size_t i = 0; i < bricks.size(); ++i)
+      bricks_.grow(before[i], bricks[i].second->bytes());
   };
   try {
     readAll(withoutValues, &FileBlockSource::readValues);
@@ -222,7 +227,6 @@ void FileBlockSource::prepare(std::span<const VisibleBlock> blocks) {
     brick->farIn = bricks_.frame();
   for (const auto& [place, brick] : notViewed)
     brick->viewedIn = bricks_.frame();
-  bricks_.count();
   mostHeld_ = std::max(mostHeld_, bricks_.bytes());
   bricks_.forget(memoryBytes_);
 }

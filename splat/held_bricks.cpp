@@ -32,12 +32,6 @@ const HeldBrick* HeldBricks::find(uint64_t number) const {
   return found == bricks_.end() ? nullptr : &found->second;
 }
 
-void HeldBricks::count() {
-  bytes_ = 0;
-  for (const auto& [number, brick] : bricks_)
-    bytes_ += brick.bytes();
-}
-
 void HeldBricks::forget(uint64_t bytes) {
   if (bytes_ <= bytes) return;
   std::vector<std::pair<uint64_t, uint64_t>> old;  // when last used, and which

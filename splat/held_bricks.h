@@ -42,8 +42,8 @@ class HeldBricks {
   const HeldBrick* find(uint64_t number) const;
 
   uint64_t bytes() const { return bytes_; }
-  /// Recounts bytes() after bricks were filled.
-  void count();
+  /// Tells how much more or less a brick takes than before.
+  void grow(uint64_t before, uint64_t now) { bytes_ += now - before; }
   /// Forgets bricks not used in this call, those first that were not used for the longest time, down to so many bytes.
   void forget(uint64_t bytes);
   void clear();

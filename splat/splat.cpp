@@ -325,12 +325,20 @@ LightGrid Splatter::State::lightVoxels(const Camera& camera, const SplatOptions&
 }
 
 uint64_t Splatter::State::gridBytes(const SplatOptions& options, AttenuationSource source) const {
-  // Codes and attenuation, of which the near field makes another; light, and attenuation towards each lamp.
-  uint64_t perVoxel = (hasNearField(source, options.footprint) ? 3 : 2) * sizeof(uint16_t);
-  if (!options.lighting.unlit()) {
-    perVoxel += sizeof(LightValue) + options.lighting.lights.size() * sizeof(uint16_t);
+  // Codes, attenuation towards the eye; light, and attenuation towards lamps that have it for the whole volume.
+  uint64_t perVoxel = 2 * sizeof(uint16_t);
+  uint64_t ratios = source == AttenuationSource::stored ? 1 : 0;
+  bool nearField = hasNearField(source, options.footprint);
+  if (!options.lighting.unlit()) perVoxel += sizeof(LightValue);
+  for (const Light& lamp : options.lighting.lights) {
+    const AttenuationSource ofLamp = chosen(options.lightAttenuation, towardsLamp(placement, lamp), true);
+    if (ofLamp == AttenuationSource::stored || ofLamp == AttenuationSource::swept) perVoxel += sizeof(uint16_t);
+    if (ofLamp == AttenuationSource::stored) ++ratios;
+    nearField = nearField || hasNearField(ofLamp, options.footprint);
   }
-  return voxelCount(dims) * perVoxel;
+  // The near field of one is made beside what it is made from.
+  if (nearField) perVoxel += sizeof(uint16_t);
+  return voxelCount(dims) * perVoxel + (ratios > 0 ? CoarseVolume::bytesFor(dims) : 0);
 }
 
 uint64_t Splatter::State::pictureBytes(const Camera& camera) {
@@ -346,10 +354,10 @@ void Splatter::State::shareMemory(Frame& to, uint64_t fixedBytes, uint64_t bytes
   fixedBytes += pictureBytes(to.camera);
   const uint64_t perBlock = bytesPerBlock + cpuCanvasBytes(blockEdge);
   if (allowed < fixedBytes + perBlock) {
-    throw MachineError(fmt::format(
-        "this picture needs {} bytes of memory beside the program, {} are left for it; allow more, or make it "
-        "smaller (swept and pinned attenuation need more than stored does)",
-        fixedBytes + perBlock, allowed));
+    throw MachineError(
+        fmt::format("this picture needs {} bytes of memory beside the program, {} are left for it; allow more, make it "
+                    "smaller, or take --attenuation interpolated, which needs least",
+                    fixedBytes + perBlock, allowed));
   }
   const uint64_t rest = allowed - fixedBytes;
   to.blocksAtATime = size_t(std::clamp<uint64_t>(rest / 2 / perBlock, 1, to.blocksAtATime));
@@ -412,7 +420,8 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
       to.statistics.lightAttenuation = attenuationSourceName(ofLamp);
       LampSource lamp;
       // What is pinned or swept is of the whole volume. What is stored may be: it then serves later frames too.
-      const bool kept = options.lodPixels == 0.0 && options.memoryBytes == 0 && hasNearField(ofLamp, options.footprint);
+      const bool kept = options.lodPixels == 0.0 && options.memoryBytes == 0 && !options.blockwise && !to.allLevels &&
+                        hasNearField(ofLamp, options.footprint);
       if (ofLamp == AttenuationSource::swept || ofLamp == AttenuationSource::pinned || kept) {
         to.lampGrids[i] = lampGrid(target, ofLamp, options.footprint);
         lamp.swept = to.lampGrids[i].get();
@@ -424,7 +433,8 @@ void Splatter::State::lookIntoFile(Frame& to, const Towards& eye, AttenuationSou
     }
   }
   to.statistics.lightSeconds = secondsSince(lightStart);
-  if (coarse) fixedBytes += coarse->bytes();
+  if (coarse) fixedBytes += CoarseVolume::bytesFor(dims);
+  if (own) fixedBytes += voxelCount(dims) * sizeof(uint16_t);
   for (const auto& ratio : to.ratios)
     fixedBytes += ratio->bytes();
   uint64_t sourceBytes = 0;
@@ -480,9 +490,10 @@ void Splatter::prepareFrame(const Camera& camera, const SplatOptions& options, b
   // What is swept or pinned is an array of the whole volume; so is all else where there is room, which for a whole
   // picture is faster than bricks.
   const bool nearField = hasNearField(source, options.footprint);
-  const bool fits = options.memoryBytes == 0 || options.memoryBytes >= state.gridBytes(options, source) +
-                                                                           State::pictureBytes(camera) +
-                                                                           cpuCanvasBytes(state.blockEdge);
+  const bool fits =
+      options.memoryBytes == 0 ||
+      (!allLevels && options.memoryBytes >= state.gridBytes(options, source) + State::pictureBytes(camera) +
+                                                cpuCanvasBytes(state.blockEdge));
   if (source == AttenuationSource::swept || source == AttenuationSource::pinned ||
       (nearField && options.lodPixels == 0.0 && !options.blockwise && fits)) {
     std::unique_ptr<BlockSource> coarser;

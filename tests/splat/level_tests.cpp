@@ -146,6 +146,16 @@ TEST(Levels, RefinementEndsInTheBitsOfTheDirectPicture) {
       before = now;
     }
     EXPECT_GT(before, compareImages(pictures[0], pictures.back()).psnr + 1.0);
+    if (options.lighting.unlit()) continue;
+    SplatOptions bounded = options;
+    bounded.memoryBytes = uint64_t(48) << 20;
+    splatter.refine(
+        camera, bounded,
+        [&](size_t n, const Sums& sums) {
+          ASSERT_LT(n, pictures.size());
+          EXPECT_TRUE(compareImages(pictures[n], resolve(sums, Formula::normalised)).identical) << n;
+        },
+        silentProgress());
   }
 }
 
@@ -230,6 +240,7 @@ TEST(Levels, CutOfTheFinestLevelHasTheBitsOfTheDirectPicture) {
     EXPECT_EQ(levelsDrawn(cut.statistics), 1);
     options.lodPixels = 0.0;
     options.blockwise = true;
+    EXPECT_TRUE(sameSums(splatter.render(camera, options, silentProgress()), direct));
     options.memoryBytes = uint64_t(24) << 20;
     EXPECT_TRUE(sameSums(splatter.render(camera, options, silentProgress()), direct));
   }
@@ -238,17 +249,20 @@ TEST(Levels, CutOfTheFinestLevelHasTheBitsOfTheDirectPicture) {
 // A splatter keeps bricks and its canvas from frame to frame.
 TEST(Levels, FramesDoNotDependOnThoseBefore) {
   const Scene scene = lumps();
-  SplatOptions coarse, kernel = kKernel, shaded, finest, swept, bounded;
+  SplatOptions coarse, kernel = kKernel, shaded, finest, swept, bounded, nearLit;
   coarse.lodPixels = kernel.lodPixels = shaded.lodPixels = bounded.lodPixels = 2.5;
   shaded.lighting.ambient = 0.2f;
   shaded.lighting.shading = Shading::phong;
   shaded.lighting.lights = {{true, {1.0, 2.0, 1.0}, {1.0f, 0.8f, 0.5f}}};
   for (SplatOptions* options : {&kernel, &shaded, &finest})
     options->attenuation = options->lightAttenuation = AttenuationSource::interpolated;
+  nearLit.lodPixels = 1e-3;
+  nearLit.lighting = shaded.lighting;
   swept.attenuation = AttenuationSource::swept;
   bounded.memoryBytes = uint64_t(24) << 20;
   bounded.gpuMemoryBytes = uint64_t(8) << 20;
-  const std::vector<SplatOptions> row = {coarse, shaded, kernel, coarse, bounded, swept, shaded, finest, coarse};
+  const std::vector<SplatOptions> row = {coarse, shaded,  kernel, coarse, bounded,
+                                         swept,  nearLit, shaded, finest, coarse};
   const auto view = [&](size_t n) {
     Camera camera = alongView(scene, n % 3 == 2 ? glm::ivec2(31, 40) : glm::ivec2(41, 30));
     camera.eye.x += 3.0 * double(n % 4);
