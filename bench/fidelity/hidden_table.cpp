@@ -45,6 +45,7 @@ void addHidden(Table& table, const Scene& scene, const TableOptions& options) {
     for (const Camera& view : randomViews(scene.bounds(), std::min(kViews, options.views), options.imageSize)) {
       SplatOptions splats;
       splats.attenuation = source;
+      splatter.render(view, splats, silentProgress());  // bricks and blocks then have their memory
       const SplatResult all = splatter.render(view, splats, silentProgress());
       splats.cull = Cull::hidden;
       const SplatResult culled = splatter.render(view, splats, silentProgress());
