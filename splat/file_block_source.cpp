@@ -20,7 +20,8 @@ namespace freevoxel {
 
 namespace {
 
-/// Positions take 21 bits along each axis (validDims), levels the rest.
+/// Of a brick's position along each axis: more than any volume has bricks (validDims, validBrickEdge). Levels take the
+/// rest.
 constexpr int kPositionBits = 19;
 
 glm::ivec3 atIndex(size_t i, int edge) {

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <utility>
+#include <vector>
 
 #include "base/compare.h"
 #include "bench/hierarchy/tables.h"
@@ -12,26 +14,27 @@ namespace freevoxel::bench {
 
 namespace {
 
+/// A frame: of several, that of the median time.
 struct Timed {
   Image picture;
   SplatStatistics statistics;
-  double seconds = 0.0;  ///< median
+  double seconds = 0.0;
 };
 
 Timed timed(Splatter& splatter, const Camera& view, const SplatOptions& options, int repeats) {
-  Timed result;
-  std::vector<double> seconds;
+  std::vector<Timed> frames;
   // The first fills caches and does not count.
   for (int repeat = 0; repeat <= repeats; ++repeat) {
     const auto start = std::chrono::steady_clock::now();
     const SplatResult drawn = splatter.render(view, options, silentProgress());
-    result.picture = resolve(drawn.sums, Formula::normalised);
-    if (repeat > 0) seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-    result.statistics = drawn.statistics;
+    Image picture = resolve(drawn.sums, Formula::normalised);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    if (repeat > 0) frames.push_back({std::move(picture), drawn.statistics, seconds});
   }
-  std::nth_element(seconds.begin(), seconds.begin() + ptrdiff_t(seconds.size() / 2), seconds.end());
-  result.seconds = seconds[seconds.size() / 2];
-  return result;
+  const auto middle = frames.begin() + ptrdiff_t(frames.size() / 2);
+  std::nth_element(frames.begin(), middle, frames.end(),
+                   [](const Timed& a, const Timed& b) { return a.seconds < b.seconds; });
+  return std::move(*middle);
 }
 
 std::string blocksText(const SplatStatistics& statistics) {
