@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
+#include <utility>
 
 namespace freevoxel {
 
@@ -26,19 +26,23 @@ std::string duration(double seconds) {
 
 }  // namespace
 
+ProgressBar::ProgressBar(std::FILE* terminal, std::function<Clock::time_point()> now)
+    : terminal_(terminal), now_(std::move(now)) {}
+
 void ProgressBar::begin(const std::string& stage, uint64_t total, const std::string& unit) {
   end();
   stage_ = stage;
   unit_ = unit;
   total_ = total;
   done_ = 0;
-  start_ = lastDrawn_ = Clock::now();
+  start_ = now_();
+  draw(start_);
 }
 
 void ProgressBar::advance(uint64_t steps) {
   constexpr std::chrono::milliseconds kRedraw(100);
   done_ += steps;
-  const Clock::time_point now = Clock::now();
+  const Clock::time_point now = now_();
   if (now - lastDrawn_ >= kRedraw) draw(now);
 }
 
@@ -47,21 +51,23 @@ void ProgressBar::draw(Clock::time_point now) {
   lastDrawn_ = now;
   shown_ = true;
   const double share = total_ == 0 ? 1.0 : std::min(1.0, double(done_) / double(total_));
-  const double elapsed = std::chrono::duration<double>(now - start_).count();
-  const double rate = elapsed > 0.0 ? double(done_) / elapsed : 0.0;
-  const double left = rate > 0.0 ? double(total_ - std::min(done_, total_)) / rate : 0.0;
   const std::string bar(size_t(share * kWidth), '#');
+  fmt::print(terminal_, "\r{} [{:<{}}] {:3.0f} %", stage_, bar, kWidth, 100.0 * share);
+  if (done_ != 0 && now > start_) {
+    const double rate = double(done_) / std::chrono::duration<double>(now - start_).count();
+    const double left = double(total_ - std::min(done_, total_)) / rate;
+    fmt::print(terminal_, "  {}{}/s  {} left", withPrefix(rate), unit_, duration(left));
+  }
   // Erases what a longer line before may have left.
-  fmt::print(stderr, "\r{} [{:<{}}] {:3.0f} %  {}{}/s  {} left\x1b[K", stage_, bar, kWidth, 100.0 * share,
-             withPrefix(rate), unit_, duration(left));
-  std::fflush(stderr);
+  fmt::print(terminal_, "\x1b[K");
+  std::fflush(terminal_);
 }
 
 void ProgressBar::end() {
   if (!shown_) return;
   shown_ = false;
-  fmt::print(stderr, "\r\x1b[K");
-  std::fflush(stderr);
+  fmt::print(terminal_, "\r\x1b[K");
+  std::fflush(terminal_);
 }
 
 }  // namespace freevoxel
