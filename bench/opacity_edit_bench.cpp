@@ -1,12 +1,14 @@
 // From an opacity edit to the new picture, stage by stage, for a volume of bytes that is already open. Prints a
 // Markdown table; arguments: edges of the volume, 256 if there are none. Threads as OMP_NUM_THREADS says.
 #include <fmt/core.h>
+#include <malloc.h>
 #include <omp.h>
 
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -106,6 +108,10 @@ void measure(int edge) {
 }  // namespace freevoxel
 
 int main(int argc, char** argv) {
+  // A program that keeps a volume open keeps its memory too. What goes back to the system is not only slow to come by
+  // again: on a virtual machine that reports free pages to its host, memory is slow for whatever runs next.
+  mallopt(M_MMAP_MAX, 0);
+  mallopt(M_TRIM_THRESHOLD, std::numeric_limits<int>::max());
   for (int i = 1; i < argc; ++i)
     freevoxel::measure(std::clamp(std::atoi(argv[i]), 8, 1024));
   if (argc == 1) freevoxel::measure(256);

@@ -1,15 +1,21 @@
-// A number for every value code, looked up row by row; or the code itself.
+// A number for every value code, looked up for whole rows; or the code itself.
 #pragma once
 
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <type_traits>
 #include <vector>
 
 namespace freevoxel {
+
+/// Rows of codes one after another.
+struct CodeRows {
+  const uint16_t* codes = nullptr;
+  size_t width = 0, count = 0;
+  ptrdiff_t ahead = 0;  ///< from here to codes that will be wanted next, and may be fetched into the caches
+};
 
 /// `entries` for codes 0..size-1; T is a whole or floating-point number of 32 bits.
 class CodeTable {
@@ -23,23 +29,23 @@ class CodeTable {
     split();
   }
 
-  /// out[i] = entries[codes[i]], for codes below the number of entries.
+  /// out[stride * row + x] = entries[code x of the row], for codes below the number of entries.
   template <class T>
-  void row(std::span<const uint16_t> codes, T* out) const {
-    lookUp(codes, reinterpret_cast<uint32_t*>(out));
+  void lookUp(const CodeRows& rows, T* out, size_t stride) const {
+    lookUpBits(rows, reinterpret_cast<uint32_t*>(out), stride);
   }
 
  private:
   static constexpr size_t kByteCodes = 256;
   void split();
-  void lookUp(std::span<const uint16_t> codes, uint32_t* out) const;
+  void lookUpBits(const CodeRows& rows, uint32_t* out, size_t stride) const;
 
   std::vector<uint32_t> bits_;
   /// If no code takes more than a byte: byte b of the entry of code c at 256 b + c.
   std::vector<uint8_t> bytes_;
 };
 
-/// out[i] = codes[i].
-void codesAsFloats(std::span<const uint16_t> codes, float* out);
+/// out[stride * row + x] = code x of the row.
+void codesAsFloats(const CodeRows& rows, float* out, size_t stride);
 
 }  // namespace freevoxel

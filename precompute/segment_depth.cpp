@@ -5,8 +5,6 @@
 #include <limits>
 #include <vector>
 
-#include "precompute/code_table.h"
-
 namespace freevoxel {
 
 namespace {
@@ -24,12 +22,12 @@ class VoxelSegments final : public SegmentDepth {
   VoxelSegments(const TransferFunction& transfer, const ValueCoding& coding) : own_(ownDepths(transfer, coding)) {}
 
   SegmentRule rule() const override { return SegmentRule::neighbour; }
-  void terms(std::span<const uint16_t> codes, const MutableSegmentTerms& rows) const override {
-    if (rows.own != nullptr) own_.row(codes, rows.own);
+  void terms(const CodeRows& codes, const MutableSegmentTerms& rows, size_t stride) const override {
+    if (rows.own != nullptr) own_.lookUp(codes, rows.own, stride);
   }
   void row(std::span<const uint16_t> /*codes*/, std::span<const uint16_t> nextCodes,
            FixedDepth* depths) const override {
-    own_.row(nextCodes, depths);
+    own_.lookUp({nextCodes.data(), nextCodes.size(), 1}, depths, nextCodes.size());
   }
 
  private:
@@ -91,11 +89,12 @@ class PreintegratedSegments final : public SegmentDepth {
 
   SegmentRule rule() const override { return split_ ? SegmentRule::splitIntegral : SegmentRule::integral; }
 
-  void terms(std::span<const uint16_t> codes, const MutableSegmentTerms& rows) const override {
-    if (rows.own != nullptr) own_.row(codes, rows.own);
-    high_.row(codes, rows.high);
-    if (split_) low_.row(codes, rows.low);
-    codesAsFloats(codes, rows.code);
+  void terms(const CodeRows& codes, const MutableSegmentTerms& rows, size_t stride) const override {
+    if (rows.own != nullptr) own_.lookUp(codes, rows.own, stride);
+    if (rows.code == nullptr) return;
+    codesAsFloats(codes, rows.code, stride);
+    high_.lookUp(codes, rows.high, stride);
+    if (split_) low_.lookUp(codes, rows.low, stride);
   }
 
   void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const override {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <span>
 
+#include "precompute/code_table.h"
 #include "precompute/fixed_depth.h"
 #include "precompute/format.h"
 #include "volume/transfer_function.h"
@@ -40,8 +41,8 @@ class SegmentDepth {
  public:
   virtual ~SegmentDepth() = default;
   virtual SegmentRule rule() const = 0;
-  /// Fills the rows that the rule asks for; not `own` if it is null.
-  virtual void terms(std::span<const uint16_t> codes, const MutableSegmentTerms& rows) const = 0;
+  /// Fills as many rows, `stride` apart, of what the rule asks for and is not null.
+  virtual void terms(const CodeRows& codes, const MutableSegmentTerms& rows, size_t stride) const = 0;
   /// depths[x] = segment(codes[x], nextCodes[x]); all three of one size.
   virtual void row(std::span<const uint16_t> codes, std::span<const uint16_t> nextCodes, FixedDepth* depths) const = 0;
 };

@@ -6,6 +6,7 @@
 #include <array>
 #include <bit>
 #include <cstring>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -88,64 +89,80 @@ SlabBricks sortBricks(const Shape& shape, std::span<const BrickPlanes> bricks) {
 class StripTerms {
  public:
   StripTerms(const Shape& shape, SegmentRule rule, SweepMemory& memory)
-      : beside_(rule == SegmentRule::neighbour ? 0 : 1), own_(kAllRows, shape.width, memory) {
+      : beside_(rule != SegmentRule::neighbour), own_(kAllRows, shape.width, memory) {
     if (rule == SegmentRule::neighbour) return;
     code_ = Rows(kAllRows, shape.width, memory);
+    std::fill_n(floats(code_, 0) - kRowUnit, size_t(kAllRows) * code_.stride(), kOutsideCode);
     high_ = Rows(kAllRows, shape.width, memory);
     if (rule == SegmentRule::splitIntegral) low_ = Rows(kAllRows, shape.width, memory);
   }
 
-  void begin(int strip) { strip_ = strip; }
+  /// Which rows beside the strip will be read.
+  void begin(int strip, bool rowBefore, bool rowBehind) {
+    strip_ = strip;
+    rowsBefore_ = beside_ && rowBefore ? 1 : 0;
+    rowsBehind_ = beside_ && rowBehind ? 1 : 0;
+  }
 
   /// Fills a plane of the strip. `place` counts planes from the one before the slab, which is 0. The next strip will be
   /// `nextStrip`.
   void fill(const Shape& shape, const SegmentDepth& segments, const CodeSlab& codes, int place, int z, int nextStrip) {
-    if (z < 0 || z >= shape.dims.z || (place == 0 && beside_ == 0)) return;
-    for (int y = -beside_; y < kRunEdge + beside_; ++y) {
-      const glm::ivec3 first(0, strip_ * kRunEdge + y, z - codes.first);
-      if (first.y < 0 || first.y >= shape.dims.y) continue;
-      const bool within = y >= 0 && y < kRunEdge;
-      if (within) prefetchRow(shape, codes, {0, nextStrip * kRunEdge + y, first.z});
-      const int row = place % kPlanes * kPlaneRows + y + 1;
-      segments.terms(
-          {codes.codes + linearIndex(first, shape.dims), size_t(shape.dims.x)},
-          {within && place != 0 ? own_.row(row) : nullptr, floats(code_, row), floats(high_, row), floats(low_, row)});
-    }
+    if (z < 0 || z >= shape.dims.z || (place == 0 && !beside_)) return;
+    const uint16_t* const plane = codes.codes + linearIndex({0, 0, z - codes.first}, shape.dims);
+    const auto width = size_t(shape.dims.x);
+    const int inside = shape.stripRows(strip_);
+    for (int y = inside; y < kRunEdge; ++y)
+      clear(rowOf(place, y), width);
+    if (inside == 0) return;
+    // Rows of successive planes lie too far apart for the processor to foresee.
+    const bool last = nextStrip < 0 || nextStrip >= shape.strips();
+    const ptrdiff_t ahead = last ? 0 : ptrdiff_t(nextStrip - strip_) * kRunEdge * shape.dims.x;
+    const auto rows = [&](int first, int end) {
+      return CodeRows{plane + size_t(strip_ * kRunEdge + first) * width, width, size_t(end - first), ahead};
+    };
+    if (place != 0) segments.terms(rows(0, inside), {own_.row(rowOf(place, 0))}, own_.stride());
+    if (!beside_) return;
+    int first = -rowsBefore_, end = inside + (inside == kRunEdge ? rowsBehind_ : 0);
+    if (strip_ == 0 && first < 0) clear(rowOf(place, first++), width);
+    if (strip_ * kRunEdge + end > shape.dims.y) clear(rowOf(place, --end), width);
+    const int row = rowOf(place, first);
+    segments.terms(rows(first, end), {nullptr, floats(code_, row), floats(high_, row), floats(low_, row)},
+                   own_.stride());
   }
 
   SegmentTerms all() { return {own_.row(0), floats(code_, 0), floats(high_, 0), floats(low_, 0)}; }
   /// Entry in all() at which a plane starts, one of the last kPlanes filled.
-  uint32_t plane(int place) const { return entry(place % kPlanes * kPlaneRows); }
+  ptrdiff_t plane(int place) const { return entry(place % kPlanes * kPlaneRows); }
   /// From there to row y of the strip, -1..kRunEdge.
-  uint32_t row(int y) const { return entry(y + 1); }
-  /// From there to a row outside the volume.
-  uint32_t nothing() const { return entry(kPlaneRows - 1); }
+  ptrdiff_t row(int y) const { return entry(y + 1); }
 
  private:
   static constexpr int kPlanes = kRunEdge + 1;
-  static constexpr int kPlaneRows = kRunEdge + 3;  ///< the last one is nothing
+  static constexpr int kPlaneRows = kRunEdge + 2;
+  /// Makes segments 0 that lead outside the volume: a finite integral is divided by it.
+  static constexpr float kOutsideCode = std::numeric_limits<float>::infinity();
 
  public:
   static constexpr int kAllRows = kPlanes * kPlaneRows;
 
  private:
-  uint32_t entry(int row) const { return uint32_t(size_t(row) * own_.stride()); }
+  void clear(int row, size_t count) {
+    std::fill_n(own_.row(row), count, 0u);
+    if (!beside_) return;
+    std::fill_n(floats(code_, row), count, kOutsideCode);
+    std::fill_n(floats(high_, row), count, 0.0f);
+    if (low_.stride() != 0) std::fill_n(floats(low_, row), count, 0.0f);
+  }
+  ptrdiff_t entry(int row) const { return ptrdiff_t(size_t(row) * own_.stride()); }
   static float* floats(Rows& rows, int row) {
     return rows.stride() == 0 ? nullptr : reinterpret_cast<float*>(rows.row(row));
   }
 
-  /// What the next strip will read: rows of successive planes lie too far apart for the processor to foresee.
-  static void prefetchRow(const Shape& shape, const CodeSlab& codes, glm::ivec3 first) {
-    if (first.y < 0 || first.y >= shape.dims.y) return;
-    const uint16_t* const row = codes.codes + linearIndex(first, shape.dims);
-    for (int x = 0; x < shape.dims.x; x += kCodesPerLine)
-      __builtin_prefetch(row + x);
-  }
+  static int rowOf(int place, int y) { return place % kPlanes * kPlaneRows + y + 1; }
 
-  static constexpr int kCodesPerLine = 32;
-  int beside_;  ///< rows beside the strip that count
+  bool beside_;  ///< rows beside the strip and the plane before may count
   Rows own_, code_, high_, low_;
-  int strip_ = 0;
+  int strip_ = 0, rowsBefore_ = 0, rowsBehind_ = 0;
 };
 
 /// What a thread needs for the strip at hand.
@@ -157,17 +174,18 @@ struct Scratch {
         bytes(kRunEdge, shape.width, memory) {}
   StripTerms terms;
   Rows noDepths;  ///< zeros
-  Rows depths;    ///< of one plane of a strip, for level 1
+  Rows depths;    ///< of one plane of a strip
   Rows bytes;     ///< four planes of a strip: see TilePlane::bytes
 };
 
 /// Four planes of a strip, in the order of the sweep.
 struct TilePlace {
   int strip;
-  int runZ;    ///< of the planes, in the slab
-  int planes;  ///< inside the volume
-  int firstZ;  ///< of these
-  int done;    ///< planes of the slab that are behind, all inside the volume
+  int runZ;       ///< of the planes, in the slab
+  int planes;     ///< inside the volume
+  int firstZ;     ///< of these
+  int done;       ///< planes of the slab that are behind, all inside the volume
+  int nextStrip;  ///< will be swept next, or lies outside the volume
 };
 
 /// Depths along one direction, kept from plane to plane and from strip to strip.
@@ -181,11 +199,9 @@ class DirectionSweep {
     tile_.rule = rule;
     tile_.stride = state_.stride();
     tile_.width = shape.width;
-    tile_.voxels = shape.dims.x;
     tile_.stepX = step_.x;
     tile_.stepY = step_.y;
     tile_.samePlane = step_.z == 0;
-    tile_.leavingRow = step_.y > 0 ? 0 : kRunEdge - 1;
   }
 
   glm::ivec3 step() const { return step_; }
@@ -207,28 +223,11 @@ class DirectionSweep {
     tile_.terms = scratch.terms.all();
     tile_.state = state_.row(step_.z != 0 ? strip * kRunEdge : 0);
     tile_.wanted = bricks.wanted[size_t(strip / shape.runsPerEdge())].data();
-    tile_.depths = nullptr;
-    tile_.beyondRow = -1;
-    for (int y = 0; y < kRunEdge; ++y) {
-      const auto row = size_t(y);
-      const int volumeY = strip * kRunEdge + y, nextY = volumeY + step_.y;
-      tile_.own[row] = volumeY < shape.dims.y ? scratch.terms.row(y) : scratch.terms.nothing();
-      tile_.linked[row] = volumeY < shape.dims.y && nextY >= 0 && nextY < shape.dims.y;
-      if (!tile_.linked[row]) {
-        tile_.next[row] = scratch.noDepths.row(0);
-        tile_.from[row] = tile_.neighbour[row] = scratch.terms.nothing();
-        continue;
-      }
-      if (y + step_.y < 0 || y + step_.y >= kRunEdge) {
-        tile_.beyondRow = y;
-      } else {
-        tile_.next[row] = tile_.state + size_t(y + step_.y) * tile_.stride;
-      }
-      tile_.from[row] = tile_.own[row];
-      tile_.neighbour[row] = scratch.terms.row(y + step_.y);
-    }
+    tile_.depths = scratch.depths.row(0);
+    const int rowBeyond = step_.y > 0 ? (strip + 1) * kRunEdge : strip * kRunEdge - 1;
+    nothingBeyond_ = rowBeyond < 0 || rowBeyond >= shape.dims.y ? scratch.noDepths.row(0) : nullptr;
     if (step_.y != 0 && step_.z != 0) {
-      std::memcpy(leaving(shape, 0), tile_.state + size_t(tile_.leavingRow) * tile_.stride,
+      std::memcpy(leaving(shape, 0), tile_.state + (step_.y > 0 ? 0 : kRunEdge - 1) * tile_.stride,
                   size_t(shape.width) * sizeof(FixedDepth));
     }
   }
@@ -242,6 +241,7 @@ class DirectionSweep {
     auto* const bytes = reinterpret_cast<uint8_t*>(scratch.bytes.row(0));
     const size_t planeBytes = scratch.bytes.stride() * sizeof(FixedDepth);
     const bool nothing = place.planes == 0 || place.strip * kRunEdge >= shape.dims.y;
+    if (step_.z != 0) prefetchState(shape, place);
     if (nothing || place.planes < kRunEdge) {
       std::memset(bytes, kAttenuationOutside, (kRunEdge - 1) * planeBytes + size_t(shape.width) * kRunEdge);
     }
@@ -251,20 +251,21 @@ class DirectionSweep {
         const int z = place.firstZ + order * i, done = place.done + i;
         const int neighbourPlace = step_.z != 0 ? done : done + 1;
         TilePlane& plane = tile_.planes[size_t(i)];
-        plane.own = scratch.terms.plane(done + 1);
-        plane.neighbour = scratch.terms.plane(neighbourPlace);
+        plane.own = scratch.terms.plane(done + 1) + scratch.terms.row(0);
+        plane.neighbour = scratch.terms.plane(neighbourPlace) + scratch.terms.row(step_.y) + step_.x;
         plane.neighbourOutside = z + step_.z < 0 || z + step_.z >= shape.dims.z;
         plane.bytes = bytes + size_t(z % kRunEdge) * planeBytes;
         if (step_.y == 0) continue;
-        plane.beyond = beyond(shape, neighbourPlace);
+        plane.beyond = nothingBeyond_ != nullptr ? nothingBeyond_ : beyond(shape, neighbourPlace);
         plane.leaving = leaving(shape, done + 1);
       }
       if (levels.depths != nullptr) {
-        sweepPlanes(shape, codes, place, levels, scratch.depths.row(0));
+        sweepPlanes(shape, codes, place, levels);
       } else {
         tile_.planeCount = place.planes;
         sweepTile(tile_);
       }
+      clearOutside(shape, place.strip, bytes, planeBytes);
     }
     const int runs = shape.runsPerEdge();
     const size_t brickVoxels = size_t(shape.edge) * size_t(shape.edge) * size_t(shape.edge);
@@ -277,23 +278,50 @@ class DirectionSweep {
   static int edgeRows(const Shape& shape) { return shape.edge + 2; }
   /// How far the place of what leaves lies before that of what comes in.
   int edgeShift() const { return step_.z != 0 ? 1 : 0; }
-  FixedDepth* beyond(const Shape& shape, int place) { return edges_.row((firstEdge_ + place) % edgeRows(shape)); }
-  FixedDepth* leaving(const Shape& shape, int place) { return beyond(shape, place + edgeRows(shape) - edgeShift()); }
+  /// For 0 <= place < edgeRows.
+  FixedDepth* beyond(const Shape& shape, int place) {
+    const int row = firstEdge_ + place;
+    return edges_.row(row < edgeRows(shape) ? row : row - edgeRows(shape));
+  }
+  FixedDepth* leaving(const Shape& shape, int place) {
+    const int row = place - edgeShift();
+    return beyond(shape, row >= 0 ? row : row + edgeRows(shape));
+  }
+
+  /// What the next strip will read first, a row at a time: it has left the nearer caches since the slab before.
+  void prefetchState(const Shape& shape, const TilePlace& place) {
+    if (place.nextStrip < 0 || place.nextStrip >= shape.strips() || place.runZ >= kRunEdge) return;
+    const FixedDepth* const row = state_.row(place.nextStrip * kRunEdge + place.runZ);
+    for (int x = 0; x < shape.width; x += kRowUnit)
+      __builtin_prefetch(row + x, 1, 2);
+  }
+
+  /// Bytes of voxels outside the volume.
+  static void clearOutside(const Shape& shape, int strip, uint8_t* bytes, size_t planeBytes) {
+    const int rowsInside = shape.stripRows(strip);
+    if (rowsInside == kRunEdge && shape.dims.x == shape.width) return;
+    for (int plane = 0; plane < kRunEdge; ++plane, bytes += planeBytes) {
+      for (int row = 0; row < kRunEdge; ++row) {
+        for (int x = row < rowsInside ? shape.dims.x : 0; x < shape.width; ++x)
+          bytes[kRunEdge * (x - x % 4) + 4 * row + x % 4] = kAttenuationOutside;
+      }
+    }
+  }
 
   /// One plane of the tile after the other, since level 1 needs the depths of each.
-  void sweepPlanes(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const LevelTarget& levels,
-                   FixedDepth* depths) {
+  void sweepPlanes(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const LevelTarget& levels) {
     const std::array<TilePlane, kRunEdge> planes = tile_.planes;
     const bool up = sweepPass(direction_) == 0;
     const int firstRow = place.strip * kRunEdge, slab = place.firstZ / shape.edge;
     const auto columns = size_t(shape.dims.x + 1) / 2, rows = size_t(shape.dims.y + 1) / 2;
     tile_.planeCount = 1;
-    tile_.depths = depths;
+    tile_.depthsWanted = true;
     for (int i = 0; i < place.planes; ++i) {
       tile_.planes[0] = planes[size_t(i)];
       sweepTile(tile_);
       const int z = place.firstZ + (up ? i : -i), local = z - slab * shape.edge;
-      LevelTap::Plane plane{depths, tile_.stride, nullptr, std::min(kRunEdge, shape.dims.y - firstRow), shape.dims.x};
+      LevelTap::Plane plane{tile_.depths, tile_.stride, nullptr, std::min(kRunEdge, shape.dims.y - firstRow),
+                            shape.dims.x};
       if (levels.weights != nullptr)
         plane.codes = codes.codes + linearIndex({0, firstRow, z - codes.first}, shape.dims);
       // Planes 2 n and 2 n + 1 come one after the other, in either order.
@@ -314,7 +342,8 @@ class DirectionSweep {
   /// each. A row through which they leave this strip takes the place of the one that the same plane has read.
   Rows edges_;
   int firstEdge_ = 0;
-  Tile tile_;  ///< at hand
+  const FixedDepth* nothingBeyond_ = nullptr;  ///< zeros, if the strip before lies outside the volume
+  Tile tile_;                                  ///< at hand
   LevelTap tap_;
 };
 
@@ -344,16 +373,20 @@ struct SweepGroup {
     }
     const int planes = shape.slabPlanes(slab), first = slab * shape.edge;
     const int order = pass == 0 ? 1 : -1;
+    const auto leadsTo = [&](int stepY) {
+      return std::any_of(sweeps.begin(), sweeps.end(), [&](const DirectionSweep& s) { return s.step().y == stepY; });
+    };
+    const bool rowBefore = leadsTo(-1), rowBehind = leadsTo(1);
     for (int i = 0; i < shape.strips(); ++i) {
       const int strip = ascending ? i : shape.strips() - 1 - i;
-      scratch.terms.begin(strip);
+      scratch.terms.begin(strip, rowBefore, rowBehind);
       const int nextStrip = ascending ? strip + 1 : strip - 1;
       scratch.terms.fill(shape, segments, codes, 0, pass == 0 ? first - 1 : first + planes, nextStrip);
       for (DirectionSweep& sweep : sweeps)
         sweep.beginStrip(shape, strip, bricks, scratch);
       int done = 0;
       for (int run = 0; run < shape.runsPerEdge(); ++run) {
-        TilePlace place{strip, pass == 0 ? run : shape.runsPerEdge() - 1 - run, 0, 0, done};
+        TilePlace place{strip, pass == 0 ? run : shape.runsPerEdge() - 1 - run, 0, 0, done, nextStrip};
         place.planes = std::clamp(planes - place.runZ * kRunEdge, 0, kRunEdge);
         place.firstZ = first + place.runZ * kRunEdge + (pass == 0 ? 0 : place.planes - 1);
         for (int p = 0; p < place.planes; ++p)

@@ -38,40 +38,12 @@ HWY_INLINE Depths meanOrOwn(hn::Vec<hn::RebindToFloat<Tag>> integral, hn::Vec<hn
 template <class Floats>
 HWY_INLINE Depths meanOrOwn(Floats integral, Floats codes, Depths own) {
   const hn::RebindToFloat<Tag> floats;
-  const auto same = hn::Eq(codes, hn::Zero(floats));
-  const auto mean = hn::Div(integral, hn::IfThenElse(same, hn::Set(floats, 1.0f), codes));
-  return hn::IfThenElse(hn::RebindMask(Tag(), same), own, hn::BitCast(Tag(), hn::NearestInt(mean)));
+  const auto differ = hn::Gt(hn::Mul(codes, codes), hn::Zero(floats));
+  const auto mean = hn::Div(integral, hn::IfThenElse(differ, codes, hn::Set(floats, 1.0f)));
+  return hn::IfThenElse(hn::RebindMask(Tag(), differ), hn::BitCast(Tag(), hn::NearestInt(mean)), own);
 }
 
 #endif
-
-/// Segments from voxels of entry `own` on to those of entry `neighbour` on, where both lie in the volume.
-template <SegmentRule rule>
-HWY_INLINE Depths segmentsBetween(const SegmentTerms& terms, ptrdiff_t own, ptrdiff_t neighbour) {
-  const hn::RebindToFloat<Tag> floats;
-  const auto difference = [&](const float* values) HWY_ATTR {
-    return hn::Sub(hn::LoadU(floats, values + neighbour), hn::LoadU(floats, values + own));
-  };
-  auto integral = difference(terms.high);
-  if constexpr (rule == SegmentRule::splitIntegral) integral = hn::Add(integral, difference(terms.low));
-  return meanOrOwn(integral, difference(terms.code), hn::LoadU(Tag(), terms.own + own));
-}
-
-/// Which voxels of a row lie in the volume with their neighbours.
-struct Inside {
-  explicit Inside(const Tile& tile) : first(tile.stepX < 0 ? 1 : 0), last(tile.voxels - (tile.stepX > 0 ? 2 : 1)) {}
-  bool all(ptrdiff_t x) const { return x >= first && x + ptrdiff_t(hn::Lanes(Tag())) - 1 <= last; }
-  /// Zero for the others.
-  HWY_INLINE Depths only(Depths depths, ptrdiff_t x) const {
-    HWY_ALIGN static constexpr int32_t kLanes[kRowUnit] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
-    const hn::RebindToSigned<Tag> integers;
-    const auto at = hn::Add(hn::Load(integers, kLanes), hn::Set(integers, int32_t(x)));
-    const auto outside =
-        hn::Or(hn::Lt(at, hn::Set(integers, int32_t(first))), hn::Gt(at, hn::Set(integers, int32_t(last))));
-    return hn::IfThenElse(hn::RebindMask(Tag(), outside), hn::Zero(Tag()), depths);
-  }
-  ptrdiff_t first, last;
-};
 
 #if HWY_ARCH_X86 && HWY_TARGET <= HWY_SSE4
 
@@ -202,166 +174,232 @@ HWY_INLINE Depths lastOf(Depths v) {
 #endif
 }
 
-/// What neighbours further in see of a voxel: with the rule `neighbour` its depth and its own, else its depth.
+/// Terms of a vector of voxels in four rows, and of their neighbours. Moves along the rows.
 template <SegmentRule rule>
-HWY_INLINE Depths passedOn(Depths depths, const SegmentTerms& terms, ptrdiff_t own) {
-  if constexpr (rule != SegmentRule::neighbour) return depths;
-  return hn::Add(depths, hn::LoadU(Tag(), terms.own + own));
-}
-
-/// A plane of a tile at hand: where its rows are.
-struct PlaneRows {
-  HWY_INLINE PlaneRows(const Tile& tile, const TilePlane& plane) : inside(tile) {
-    for (size_t row = 0; row < kRunEdge; ++row) {
-      own[row] = ptrdiff_t(plane.own) + tile.own[row];
-      from[row] = ptrdiff_t(plane.own) + tile.from[row];
-      neighbour[row] = ptrdiff_t(plane.neighbour) + tile.neighbour[row] + tile.stepX;
+class TermsAt {
+ public:
+  HWY_INLINE TermsAt(const Tile& tile, const TilePlane& plane, ptrdiff_t x)
+      : stride_(ptrdiff_t(tile.stride)), own_(tile.terms.own + plane.own + x) {
+    if constexpr (rule != SegmentRule::neighbour) {
+      const ptrdiff_t own = plane.own + x, neighbour = plane.neighbour + x;
+      code_ = tile.terms.code + own;
+      high_ = tile.terms.high + own;
+      nextCode_ = tile.terms.code + neighbour;
+      nextHigh_ = tile.terms.high + neighbour;
+      if constexpr (rule == SegmentRule::splitIntegral) {
+        low_ = tile.terms.low + own;
+        nextLow_ = tile.terms.low + neighbour;
+      }
     }
   }
-  Inside inside;
-  /// Entries of the voxels, and of both ends of segments.
-  ptrdiff_t own[kRunEdge], from[kRunEdge], neighbour[kRunEdge];
+
+  HWY_INLINE Depths own(ptrdiff_t row) const { return hn::LoadU(Tag(), own_ + row * stride_); }
+  /// Segments to the neighbours, 0 if either lies outside the volume.
+  HWY_INLINE Depths segments(ptrdiff_t row) const {
+    const ptrdiff_t at = row * stride_;
+    auto integral = difference(nextHigh_ + at, high_ + at);
+    if constexpr (rule == SegmentRule::splitIntegral)
+      integral = hn::Add(integral, difference(nextLow_ + at, low_ + at));
+    return meanOrOwn(integral, difference(nextCode_ + at, code_ + at), own(row));
+  }
+  HWY_INLINE void move(ptrdiff_t step) {
+    own_ += step;
+    if constexpr (rule != SegmentRule::neighbour) {
+      code_ += step;
+      high_ += step;
+      nextCode_ += step;
+      nextHigh_ += step;
+    }
+    if constexpr (rule == SegmentRule::splitIntegral) {
+      low_ += step;
+      nextLow_ += step;
+    }
+  }
+
+ private:
+  static HWY_INLINE hn::Vec<hn::RebindToFloat<Tag>> difference(const float* a, const float* b) {
+    const hn::RebindToFloat<Tag> floats;
+    return hn::Sub(hn::LoadU(floats, a), hn::LoadU(floats, b));
+  }
+
+  ptrdiff_t stride_;
+  const FixedDepth* own_;
+  const float *code_ = nullptr, *high_ = nullptr, *low_ = nullptr;
+  const float *nextCode_ = nullptr, *nextHigh_ = nullptr, *nextLow_ = nullptr;
 };
 
-/// Depths of four rows at x are found.
-HWY_INLINE void give(const Tile& tile, const TilePlane& plane, const FourRows& rows, ptrdiff_t x) {
-  if (tile.depths != nullptr) {
-    for (size_t row = 0; row < kRunEdge; ++row)
-      hn::StoreU(rows[row], Tag(), tile.depths + row * tile.stride + x);
-  }
-  if (tile.wanted[x / kRowUnit] != 0) codeRows(rows, x, plane.bytes);
+/// What neighbours further in see of a voxel: with the rule `neighbour` its depth and its own, else its depth.
+template <SegmentRule rule>
+HWY_INLINE Depths passedOn(Depths depths, const TermsAt<rule>& terms, ptrdiff_t row) {
+  if constexpr (rule != SegmentRule::neighbour) return depths;
+  return hn::Add(depths, terms.own(row));
 }
 
-HWY_INLINE void keepInside(const Inside& inside, ptrdiff_t x, FourRows& rows) {
-  if (inside.all(x)) return;
-  for (Depths& row : rows)
-    row = inside.only(row, x);
+/// Where the kernels are in the rows of a plane.
+struct Along {
+  HWY_INLINE Along(const Tile& tile, const TilePlane& plane, bool descending)
+      : step(descending ? -ptrdiff_t(hn::Lanes(Tag())) : ptrdiff_t(hn::Lanes(Tag()))),
+        vectors(tile.width / ptrdiff_t(hn::Lanes(Tag()))),
+        x(descending ? tile.width - ptrdiff_t(hn::Lanes(Tag())) : 0),
+        wanted(tile.wanted),
+        bytes(plane.bytes) {}
+  /// Depths of four rows are found.
+  HWY_INLINE void give(const FourRows& rows) {
+    if (wanted[size_t(x) / kRowUnit] != 0) codeRows(rows, x, bytes);
+    x += step;
+  }
+  ptrdiff_t step, vectors, x;
+  const uint8_t* wanted;
+  uint8_t* bytes;
+};
+
+HWY_INLINE void storeDepths(const Tile& tile, const FourRows& rows, ptrdiff_t x) {
+  for (size_t row = 0; row < kRunEdge; ++row)
+    hn::StoreU(rows[row], Tag(), tile.depths + row * tile.stride + x);
 }
 
-/// Calls f(x) for all vectors of a row.
-template <class F>
-HWY_INLINE void forRow(int width, bool descending, F&& f) {
-  const auto lanes = ptrdiff_t(hn::Lanes(Tag()));
-  if (descending) {
-    for (ptrdiff_t x = width - lanes; x >= 0; x -= lanes)
-      f(x);
-  } else {
-    for (ptrdiff_t x = 0; x < width; x += lanes)
-      f(x);
-  }
-}
+enum class Kept {
+  whole,     ///< state is passed on as it is
+  cut,       ///< it is cut
+  cutDepths  ///< it is cut, and depths are wanted
+};
 
 /// One plane from the plane before, in place: from the neighbour after upwards in x, from the one before downwards.
-template <SegmentRule rule, bool cut>
+template <SegmentRule rule, int stepY, Kept keep>
 HWY_INLINE void renewPlane(const Tile& tile, const TilePlane& plane) {
   const Tag tag;
-  const PlaneRows at(tile, plane);
-  const SegmentTerms terms = tile.terms;
-  FixedDepth* const state = tile.state;
-  FixedDepth* const leaving = plane.leaving;
-  const size_t stride = tile.stride;
-  const FixedDepth* const leavingRow = state + size_t(tile.leavingRow) * stride;
-  const FixedDepth* next[kRunEdge];
-  for (size_t row = 0; row < kRunEdge; ++row)
-    next[row] = (int(row) == tile.beyondRow ? plane.beyond : tile.next[row]) + tile.stepX;
-  forRow(tile.width, tile.stepX < 0, [&](ptrdiff_t x) HWY_ATTR {
+  Along along(tile, plane, tile.stepX < 0);
+  TermsAt<rule> terms(tile, plane, along.x);
+  const auto stride = ptrdiff_t(tile.stride);
+  FixedDepth* state = tile.state + along.x;
+  const FixedDepth* next = state + tile.stepX;
+  const FixedDepth* beyond = stepY == 0 ? nullptr : plane.beyond + along.x + tile.stepX;
+  FixedDepth* leaving = stepY == 0 ? nullptr : plane.leaving + along.x;
+  for (ptrdiff_t i = along.vectors; i > 0; --i) {
     // All rows are read before one is written.
     FourRows rows;
-    for (size_t row = 0; row < kRunEdge; ++row) {
-      rows[row] = hn::LoadU(tag, next[row] + x);
-      if constexpr (rule != SegmentRule::neighbour)
-        rows[row] = hn::Add(rows[row], segmentsBetween<rule>(terms, at.from[row] + x, at.neighbour[row] + x));
+    for (ptrdiff_t row = 0; row < kRunEdge; ++row) {
+      const ptrdiff_t from = row + stepY;
+      rows[row] = hn::LoadU(tag, from < 0 || from >= kRunEdge ? beyond : next + from * stride);
+      if constexpr (rule != SegmentRule::neighbour) rows[row] = hn::Add(rows[row], terms.segments(row));
     }
-    keepInside(at.inside, x, rows);
-    for (size_t row = 0; row < kRunEdge; ++row) {
-      const Depths passed = passedOn<rule>(rows[row], terms, at.own[row] + x);
-      hn::StoreU(cut ? kept(passed) : passed, tag, state + row * stride + x);
+    for (ptrdiff_t row = 0; row < kRunEdge; ++row) {
+      Depths passed = passedOn<rule>(rows[row], terms, row);
+      if constexpr (keep != Kept::whole) passed = kept(passed);
+      hn::StoreU(passed, tag, state + row * stride);
+      if (stepY != 0 && row == (stepY > 0 ? 0 : kRunEdge - 1)) hn::StoreU(passed, tag, leaving);
     }
-    if (leaving != nullptr) hn::StoreU(hn::LoadU(tag, leavingRow + x), tag, leaving + x);
-    give(tile, plane, rows, x);
-  });
+    if constexpr (keep == Kept::cutDepths) storeDepths(tile, rows, along.x);
+    along.give(rows);
+    terms.move(along.step);
+    state += along.step;
+    next += along.step;
+    beyond += along.step;
+    leaving += along.step;
+  }
 }
 
 /// One plane in itself, row by row, against stepY; within a row against stepX.
 template <SegmentRule rule, int stepX, int stepY>
 HWY_INLINE void renewAcrossRows(const Tile& tile, const TilePlane& plane) {
   const Tag tag;
-  const PlaneRows at(tile, plane);
-  const FixedDepth* const beyond = tile.beyondRow < 0 ? nullptr : plane.beyond;
+  Along along(tile, plane, stepX > 0);
+  TermsAt<rule> terms(tile, plane, along.x);
+  const FixedDepth* beyond = plane.beyond + along.x;
+  FixedDepth* leaving = plane.leaving + along.x;
   // What the rows before passed on in the vector before. No array: that would not be kept in registers.
   Depths beside0 = hn::Zero(tag), beside1 = beside0, beside2 = beside0, beside3 = beside0;
-  forRow(tile.width, stepX > 0, [&](ptrdiff_t x) HWY_ATTR {
+  for (ptrdiff_t i = along.vectors; i > 0; --i) {
     FourRows rows;
-    Depths passed = beyond != nullptr ? hn::LoadU(tag, beyond + x) : hn::Zero(tag);
-    const auto renewRow = [&](size_t i, Depths& beside) HWY_ATTR {
-      const size_t row = stepY < 0 ? i : kRunEdge - 1 - i;
+    Depths passed = hn::LoadU(tag, beyond);
+    const auto renewRow = [&](ptrdiff_t place, Depths& beside) HWY_ATTR {
+      const ptrdiff_t row = stepY < 0 ? place : kRunEdge - 1 - place;
       Depths depths = passed;
       if constexpr (stepX != 0) depths = shifted<stepX>(passed, beside);
       beside = passed;
-      if constexpr (rule != SegmentRule::neighbour)
-        depths = hn::Add(depths, segmentsBetween<rule>(tile.terms, at.from[row] + x, at.neighbour[row] + x));
-      if (!tile.linked[row]) depths = hn::Zero(tag);
-      if (!at.inside.all(x)) depths = at.inside.only(depths, x);
+      if constexpr (rule != SegmentRule::neighbour) depths = hn::Add(depths, terms.segments(row));
       rows[row] = depths;
-      passed = passedOn<rule>(depths, tile.terms, at.own[row] + x);
+      passed = passedOn<rule>(depths, terms, row);
     };
     renewRow(0, beside0);
     renewRow(1, beside1);
     renewRow(2, beside2);
     renewRow(3, beside3);
-    hn::StoreU(kept(passed), tag, plane.leaving + x);
-    give(tile, plane, rows, x);
-  });
+    hn::StoreU(kept(passed), tag, leaving);
+    if (tile.depthsWanted) storeDepths(tile, rows, along.x);
+    along.give(rows);
+    terms.move(along.step);
+    beyond += along.step;
+    leaving += along.step;
+  }
 }
 
-/// One plane in itself, along rows, against stepX.
+/// One plane in itself, along rows, against stepX. Sums first, bytes then: both at once wait for each other.
 template <SegmentRule rule, int stepX>
 HWY_INLINE void renewAlongRows(const Tile& tile, const TilePlane& plane) {
   constexpr bool kUp = stepX < 0;
   const Tag tag;
-  const PlaneRows at(tile, plane);
+  Along along(tile, plane, !kUp);
+  TermsAt<rule> terms(tile, plane, along.x);
+  const auto stride = ptrdiff_t(tile.stride);
+  // With the rule `neighbour` a sum is the depth of the voxel behind.
+  FixedDepth* depths = tile.depths + along.x - (rule == SegmentRule::neighbour ? stepX : 0);
   // The sum up to the vector before, in all lanes. No array: that would not be kept in registers.
   Depths before0 = hn::Zero(tag), before1 = before0, before2 = before0, before3 = before0;
-  forRow(tile.width, !kUp, [&](ptrdiff_t x) HWY_ATTR {
-    FourRows rows;
-    const auto renewRow = [&](size_t row, Depths& before) HWY_ATTR {
-      Depths v;
-      if constexpr (rule == SegmentRule::neighbour) {
-        v = hn::LoadU(tag, tile.terms.own + at.own[row] + x);
-      } else {
-        v = segmentsBetween<rule>(tile.terms, at.from[row] + x, at.neighbour[row] + x);
-        if (!at.inside.all(x)) v = at.inside.only(v, x);
-      }
+  for (ptrdiff_t i = along.vectors; i > 0; --i) {
+    const auto renewRow = [&](ptrdiff_t row, Depths& before) HWY_ATTR {
+      const Depths v = rule == SegmentRule::neighbour ? terms.own(row) : terms.segments(row);
       const Depths sums = kept(hn::Add(runningSum<kUp>(v), before));
-      rows[row] = rule == SegmentRule::neighbour ? shifted<stepX>(sums, before) : sums;
+      hn::StoreU(sums, tag, depths + row * stride);
       before = lastOf<kUp>(sums);
     };
     renewRow(0, before0);
     renewRow(1, before1);
     renewRow(2, before2);
     renewRow(3, before3);
-    // A running sum carries on behind the volume.
-    keepInside(at.inside, x, rows);
-    give(tile, plane, rows, x);
-  });
+    terms.move(along.step);
+    depths += along.step;
+  }
+  if (rule == SegmentRule::neighbour) {
+    for (ptrdiff_t row = 0; row < kRunEdge; ++row)
+      tile.depths[row * stride + (kUp ? 0 : tile.width - 1)] = 0;
+  }
+  depths = tile.depths + along.x;
+  for (ptrdiff_t i = along.vectors; i > 0; --i) {
+    FourRows rows;
+    for (ptrdiff_t row = 0; row < kRunEdge; ++row)
+      rows[row] = hn::LoadU(tag, depths + row * stride);
+    along.give(rows);
+    depths += along.step;
+  }
 }
 
 /// Nothing further out: depths are 0.
 template <SegmentRule rule>
 void clearPlane(const Tile& tile, const TilePlane& plane) {
   const Tag tag;
-  const PlaneRows at(tile, plane);
-  forRow(tile.width, false, [&](ptrdiff_t x) HWY_ATTR {
-    FourRows rows;
-    for (size_t row = 0; row < kRunEdge; ++row) {
-      rows[row] = hn::Zero(tag);
-      hn::StoreU(passedOn<rule>(rows[row], tile.terms, at.own[row] + x), tag, tile.state + row * tile.stride + x);
-    }
-    give(tile, plane, rows, x);
-  });
-  if (plane.leaving != nullptr) {
-    std::memcpy(plane.leaving, tile.state + size_t(tile.leavingRow) * tile.stride,
-                size_t(tile.width) * sizeof(FixedDepth));
+  Along along(tile, plane, false);
+  TermsAt<rule> terms(tile, plane, 0);
+  const FourRows rows = {hn::Zero(tag), hn::Zero(tag), hn::Zero(tag), hn::Zero(tag)};
+  for (ptrdiff_t i = along.vectors; i > 0; --i) {
+    for (ptrdiff_t row = 0; row < kRunEdge; ++row)
+      hn::StoreU(passedOn<rule>(rows[row], terms, row), tag, tile.state + row * ptrdiff_t(tile.stride) + along.x);
+    if (tile.depthsWanted) storeDepths(tile, rows, along.x);
+    along.give(rows);
+    terms.move(along.step);
+  }
+  if (tile.stepY != 0) {
+    const size_t row = tile.stepY > 0 ? 0 : kRunEdge - 1;
+    std::memcpy(plane.leaving, tile.state + row * tile.stride, size_t(tile.width) * sizeof(FixedDepth));
+  }
+}
+
+template <SegmentRule rule, Kept keep>
+void renewPlaneBy(const Tile& tile, const TilePlane& plane) {
+  if (tile.stepY == 0) {
+    renewPlane<rule, 0, keep>(tile, plane);
+  } else {
+    tile.stepY < 0 ? renewPlane<rule, -1, keep>(tile, plane) : renewPlane<rule, 1, keep>(tile, plane);
   }
 }
 
@@ -384,17 +422,19 @@ void renewWithinPlane(const Tile& tile, const TilePlane& plane) {
 }
 
 template <SegmentRule rule>
-void sweepTileBy(Tile tile) {  // a copy: what is written to rows cannot change it
+void sweepTileBy(const Tile& tile) {
   for (int i = 0; i < tile.planeCount; ++i) {
     const TilePlane& plane = tile.planes[size_t(i)];
     if (plane.neighbourOutside) {
       clearPlane<rule>(tile, plane);
     } else if (tile.samePlane) {
       renewWithinPlane<rule>(tile, plane);
+    } else if (tile.depthsWanted) {
+      renewPlaneBy<rule, Kept::cutDepths>(tile, plane);
     } else if (i + 1 < tile.planeCount) {
-      renewPlane<rule, false>(tile, plane);
+      renewPlaneBy<rule, Kept::whole>(tile, plane);
     } else {
-      renewPlane<rule, true>(tile, plane);
+      renewPlaneBy<rule, Kept::cut>(tile, plane);
     }
   }
 }

@@ -23,34 +23,24 @@ inline constexpr int kRowUnit = 16;
 
 /// What changes from plane to plane of a tile.
 struct TilePlane {
-  uint32_t own = 0, neighbour = 0;     ///< entries of Tile::terms at which the voxels' and the neighbours' planes start
+  ptrdiff_t own = 0, neighbour = 0;    ///< entries of Tile::terms of the first voxel and of its neighbour
   bool neighbourOutside = false;       ///< the neighbours' plane lies outside the volume
-  const FixedDepth* beyond = nullptr;  ///< what Tile::beyondRow's neighbours pass on
-  FixedDepth* leaving = nullptr;       ///< where to put what Tile::leavingRow passes on, or null
+  const FixedDepth* beyond = nullptr;  ///< what the neighbours in the tile before pass on, if stepY is not 0
+  FixedDepth* leaving = nullptr;       ///< where to put what the next tile's neighbours pass on, likewise
   uint8_t* bytes = nullptr;            ///< A8: byte x % 4 + 4 * row of the 16 at 4 * (x - x % 4)
 };
 
 /// Four rows of voxels along one direction. A voxel passes on what its neighbours further in see: its depth, with the
-/// rule `neighbour` and its own. State is what the plane before passes on. All rows have room of zeros before and
-/// behind them; neighbours' rows are given less the step along x.
+/// rule `neighbour` and its own. State is what the plane before passes on. All rows have room before and behind them;
+/// that of state and of what comes from beyond holds zeros, that of terms is outside the volume.
 struct Tile {
   SegmentRule rule = SegmentRule::neighbour;
   SegmentTerms terms;
-  /// From the start of a plane to the rows of the voxels: outside the volume to a row of zeros.
-  std::array<uint32_t, kRunEdge> own{};
-  /// Whether the rows and their neighbours' lie in the volume.
-  std::array<bool, kRunEdge> linked{};
-  /// The rows at both ends of segments: if not linked, both a row of zeros.
-  std::array<uint32_t, kRunEdge> from{}, neighbour{};
-  /// What the neighbours pass on, of directions that leave the plane: rows of the state; zeros if not linked.
-  std::array<const FixedDepth*, kRunEdge> next{};
-  int beyondRow = -1;            ///< the row that takes TilePlane::beyond in place of `next`, or none
-  int leavingRow = 0;            ///< the row that neighbours of other tiles will need
   FixedDepth* state = nullptr;   ///< row 0; not used by directions that stay in their plane
-  FixedDepth* depths = nullptr;  ///< room for four rows of depths, if these are wanted
-  size_t stride = 0;             ///< from row to row of both
+  FixedDepth* depths = nullptr;  ///< room for four rows of depths
+  bool depthsWanted = false;     ///< they are to be there afterwards
+  size_t stride = 0;             ///< from row to row of terms, state and depths
   int width = 0;                 ///< voxels of a row, rounded up to kRowUnit
-  int voxels = 0;                ///< of a row, inside the volume
   int stepX = 0, stepY = 0;
   bool samePlane = false;           ///< the direction stays in its plane
   const uint8_t* wanted = nullptr;  ///< for each kRowUnit voxels: whether their bytes are needed
@@ -58,8 +48,8 @@ struct Tile {
   int planeCount = 0;
 };
 
-/// Renews the state plane by plane and gives the bytes of every plane, and the depths of the last one. Room before and
-/// behind the rows must be 0 and stays so.
+/// Renews the state plane by plane and gives the bytes of every plane, and the depths of the last one. For voxels
+/// outside the volume all of these are those of depth 0 or, where the sweep gets there from inside, anybody's guess.
 void sweepTile(const Tile& tile);
 
 /// Where the runs of a brick go.

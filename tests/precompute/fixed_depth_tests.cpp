@@ -67,17 +67,15 @@ TEST(AttenuationCode, neverRisesWithDepth) {
 /// Sweeps rows of depths one plane further through nothing, which leaves them as they are.
 TEST(AttenuationCode, rowsAreLikeSingleDepthsForAllDepthsAndInstructionSets) {
   constexpr int kWidth = 1 << 12, kStride = kWidth + 2 * kRowUnit;
-  std::vector<FixedDepth> depths(size_t(kStride) * kRunEdge), nothing(kStride);
+  std::vector<FixedDepth> depths(size_t(kStride) * kRunEdge), nothing(size_t(kStride) * kRunEdge);
   std::vector<uint8_t> bytes(size_t(kWidth) * kRunEdge), wanted(kWidth / kRowUnit, 1);
   Tile tile;
   tile.terms.own = nothing.data() + kRowUnit;
   tile.state = depths.data() + kRowUnit;
   tile.stride = kStride;
-  tile.width = tile.voxels = kWidth;
+  tile.width = kWidth;
   tile.wanted = wanted.data();
   tile.planeCount = 1;
-  for (size_t row = 0; row < kRunEdge; ++row)
-    tile.next[row] = tile.state + row * kStride;
   tile.planes[0].bytes = bytes.data();
   for (const int64_t target : test::instructionSets()) {
     const test::InstructionSet chosen(target);
