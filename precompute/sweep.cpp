@@ -170,12 +170,13 @@ struct Scratch {
   Scratch(const Shape& shape, SegmentRule rule, SweepMemory& memory)
       : terms(shape, rule, memory),
         noDepths(1, shape.width, memory),
-        depths(kRunEdge, shape.width, memory),
-        bytes(kRunEdge, shape.width, memory) {}
+        depths(kFanDirections * kRunEdge, shape.width, memory),
+        bytes(kFanDirections * kRunEdge, shape.width, memory) {}
   StripTerms terms;
   Rows noDepths;  ///< zeros
-  Rows depths;    ///< of one plane of a strip
-  Rows bytes;     ///< four planes of a strip: see TilePlane::bytes
+  // For each step along x:
+  Rows depths;  ///< of one plane of a strip
+  Rows bytes;   ///< four planes of a strip: see TilePlane::bytes
 };
 
 /// Four planes of a strip, in the order of the sweep.
@@ -223,7 +224,11 @@ class DirectionSweep {
     tile_.terms = scratch.terms.all();
     tile_.state = state_.row(step_.z != 0 ? strip * kRunEdge : 0);
     tile_.wanted = bricks.wanted[size_t(strip / shape.runsPerEdge())].data();
-    tile_.depths = scratch.depths.row(0);
+    // Room of its own only for what is swept together: the less, the nearer it stays.
+    const int room = tile_.rule == SegmentRule::neighbour ? 0 : (step_.x + 1) * kRunEdge;
+    tile_.depths = scratch.depths.row(room);
+    bytes_ = reinterpret_cast<uint8_t*>(scratch.bytes.row(room));
+    planeBytes_ = scratch.bytes.stride() * sizeof(FixedDepth);
     const int rowBeyond = step_.y > 0 ? (strip + 1) * kRunEdge : strip * kRunEdge - 1;
     nothingBeyond_ = rowBeyond < 0 || rowBeyond >= shape.dims.y ? scratch.noDepths.row(0) : nullptr;
     if (step_.y != 0 && step_.z != 0) {
@@ -235,41 +240,50 @@ class DirectionSweep {
   /// After its last tile.
   void endStrip(const Shape& shape) { firstEdge_ = (firstEdge_ + edgeRows(shape) - edgeShift()) % edgeRows(shape); }
 
-  /// Four planes of the strip: their bytes go to the bricks.
-  void sweep(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const SlabBricks& bricks,
-             const LevelTarget& levels, Scratch& scratch) {
-    auto* const bytes = reinterpret_cast<uint8_t*>(scratch.bytes.row(0));
-    const size_t planeBytes = scratch.bytes.stride() * sizeof(FixedDepth);
-    const bool nothing = place.planes == 0 || place.strip * kRunEdge >= shape.dims.y;
+  /// Four planes of the strip are next.
+  void beginTile(const Shape& shape, const TilePlace& place, const Scratch& scratch) {
     if (step_.z != 0) prefetchState(shape, place);
-    if (nothing || place.planes < kRunEdge) {
-      std::memset(bytes, kAttenuationOutside, (kRunEdge - 1) * planeBytes + size_t(shape.width) * kRunEdge);
+    if (place.planes < kRunEdge) {
+      std::memset(bytes_, kAttenuationOutside, (kRunEdge - 1) * planeBytes_ + size_t(shape.width) * kRunEdge);
     }
-    if (!nothing) {
-      const int order = sweepPass(direction_) == 0 ? 1 : -1;
-      for (int i = 0; i < place.planes; ++i) {
-        const int z = place.firstZ + order * i, done = place.done + i;
-        const int neighbourPlace = step_.z != 0 ? done : done + 1;
-        TilePlane& plane = tile_.planes[size_t(i)];
-        plane.own = scratch.terms.plane(done + 1) + scratch.terms.row(0);
-        plane.neighbour = scratch.terms.plane(neighbourPlace) + scratch.terms.row(step_.y) + step_.x;
-        plane.neighbourOutside = z + step_.z < 0 || z + step_.z >= shape.dims.z;
-        plane.bytes = bytes + size_t(z % kRunEdge) * planeBytes;
-        if (step_.y == 0) continue;
-        plane.beyond = nothingBeyond_ != nullptr ? nothingBeyond_ : beyond(shape, neighbourPlace);
-        plane.leaving = leaving(shape, done + 1);
-      }
-      if (levels.depths != nullptr) {
-        sweepPlanes(shape, codes, place, levels);
-      } else {
-        tile_.planeCount = place.planes;
-        sweepTile(tile_);
-      }
-      clearOutside(shape, place.strip, bytes, planeBytes);
+    const int order = sweepPass(direction_) == 0 ? 1 : -1;
+    for (int i = 0; i < place.planes; ++i) {
+      const int z = place.firstZ + order * i, done = place.done + i;
+      const int neighbourPlace = step_.z != 0 ? done : done + 1;
+      TilePlane& plane = tile_.planes[size_t(i)];
+      plane.own = scratch.terms.plane(done + 1) + scratch.terms.row(0);
+      plane.neighbour = scratch.terms.plane(neighbourPlace) + scratch.terms.row(step_.y) + step_.x;
+      plane.neighbourOutside = z + step_.z < 0 || z + step_.z >= shape.dims.z;
+      plane.bytes = bytes_ + size_t(z % kRunEdge) * planeBytes_;
+      if (step_.y == 0) continue;
+      plane.beyond = nothingBeyond_ != nullptr ? nothingBeyond_ : beyond(shape, neighbourPlace);
+      plane.leaving = leaving(shape, done + 1);
     }
+    tile_.planeCount = place.planes;
+  }
+
+  void sweep(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const LevelTarget& levels) {
+    levels.depths != nullptr ? sweepPlanes(shape, codes, place, levels) : sweepTile(tile_);
+  }
+
+  /// Whether the two directions after `first` differ from it in their steps along x only.
+  static bool isFan(const DirectionSweep* first, const DirectionSweep* end) {
+    if (end - first < kFanDirections || first->tile_.rule == SegmentRule::neighbour) return false;
+    for (int i = 0; i < kFanDirections; ++i) {
+      if (first[i].step_ != glm::ivec3(i - 1, first->step_.y, first->step_.z)) return false;
+    }
+    return true;
+  }
+  static void sweepFan(const DirectionSweep* first) {
+    freevoxel::sweepFan({&first[0].tile_, &first[1].tile_, &first[2].tile_});
+  }
+
+  /// Its bytes go to the bricks.
+  void endTile(const Shape& shape, const TilePlace& place, const SlabBricks& bricks) {
+    clearOutside(shape, place.strip, bytes_, planeBytes_);
     const int runs = shape.runsPerEdge();
     const size_t brickVoxels = size_t(shape.edge) * size_t(shape.edge) * size_t(shape.edge);
-    storeRuns(bytes, planeBytes, bricks.rows[size_t(place.strip / runs)],
+    storeRuns(bytes_, planeBytes_, bricks.rows[size_t(place.strip / runs)],
               size_t((place.runZ * runs + place.strip % runs) * runs), runs,
               size_t(direction_ % kDirectionsPerSection) * brickVoxels);
   }
@@ -344,6 +358,8 @@ class DirectionSweep {
   int firstEdge_ = 0;
   const FixedDepth* nothingBeyond_ = nullptr;  ///< zeros, if the strip before lies outside the volume
   Tile tile_;                                  ///< at hand
+  uint8_t* bytes_ = nullptr;                   ///< its bytes, plane after plane
+  size_t planeBytes_ = 0;
   LevelTap tap_;
 };
 
@@ -391,14 +407,31 @@ struct SweepGroup {
         place.firstZ = first + place.runZ * kRunEdge + (pass == 0 ? 0 : place.planes - 1);
         for (int p = 0; p < place.planes; ++p)
           scratch.terms.fill(shape, segments, codes, done + p + 1, place.firstZ + order * p, nextStrip);
-        for (DirectionSweep& sweep : sweeps)
-          sweep.sweep(shape, codes, place, bricks, levels, scratch);
+        sweepTiles(shape, codes, place, bricks, levels, scratch);
         done += place.planes;
       }
       for (DirectionSweep& sweep : sweeps)
         sweep.endStrip(shape);
     }
     finishStores();
+  }
+
+ private:
+  /// Four planes of a strip.
+  void sweepTiles(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const SlabBricks& bricks,
+                  const LevelTarget& levels, const Scratch& scratch) {
+    const bool inside = place.planes > 0 && shape.stripRows(place.strip) > 0;
+    DirectionSweep* const end = sweeps.data() + sweeps.size();
+    for (DirectionSweep* sweep = sweeps.data(); sweep < end;) {
+      const bool fan = levels.depths == nullptr && DirectionSweep::isFan(sweep, end);
+      const std::span<DirectionSweep> together(sweep, fan ? kFanDirections : 1);
+      for (DirectionSweep& one : together)
+        one.beginTile(shape, place, scratch);
+      if (inside) fan ? DirectionSweep::sweepFan(sweep) : sweep->sweep(shape, codes, place, levels);
+      for (DirectionSweep& one : together)
+        one.endTile(shape, place, bricks);
+      sweep += together.size();
+    }
   }
 };
 
@@ -432,7 +465,7 @@ uint64_t sweepMemory(const Shape& shape, int passCount, int threads) {
   const uint64_t row = uint64_t(shape.width) + 2 * kRowUnit;
   const auto e = uint64_t(shape.edge);
   const uint64_t directionRows = 9 * uint64_t(shape.strips()) * kRunEdge + 9 * (e + 2);
-  const uint64_t threadRows = 4 * StripTerms::kAllRows + 2 * kRunEdge + 1;
+  const uint64_t threadRows = 4 * StripTerms::kAllRows + 2 * kFanDirections * kRunEdge + 1;
   return row * (uint64_t(passCount) * directionRows + uint64_t(threads) * threadRows);
 }
 

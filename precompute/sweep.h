@@ -103,7 +103,7 @@ void addIncoming(std::span<const FixedDepth> incoming, int direction, int planes
                  std::span<FixedDepth> own);
 
 /// Memory that sweepAttenuation takes beside codes and brick planes: 36 bytes per voxel of an xy plane and pass, and
-/// per voxel along x about 36 edge bytes for each pass and 520 for each thread.
+/// per voxel along x about 36 edge bytes for each pass and 600 for each thread.
 uint64_t sweepBytes(glm::ivec3 dims, int edge, int passCount, int threads);
 
 }  // namespace freevoxel

@@ -258,6 +258,18 @@ HWY_INLINE void storeDepths(const Tile& tile, const FourRows& rows, ptrdiff_t x)
     hn::StoreU(rows[row], Tag(), tile.depths + row * tile.stride + x);
 }
 
+/// Bytes of a plane whose depths are there.
+HWY_INLINE void codeDepths(const Tile& tile, const TilePlane& plane, const FixedDepth* depths) {
+  const auto stride = ptrdiff_t(tile.stride);
+  Along along(tile, plane, false);
+  for (ptrdiff_t i = along.vectors; i > 0; --i) {
+    FourRows rows;
+    for (ptrdiff_t row = 0; row < kRunEdge; ++row)
+      rows[row] = hn::LoadU(Tag(), depths + along.x + row * stride);
+    along.give(rows);
+  }
+}
+
 enum class Kept {
   whole,     ///< state is passed on as it is
   cut,       ///< it is cut
@@ -364,14 +376,7 @@ HWY_INLINE void renewAlongRows(const Tile& tile, const TilePlane& plane) {
     for (ptrdiff_t row = 0; row < kRunEdge; ++row)
       tile.depths[row * stride + (kUp ? 0 : tile.width - 1)] = 0;
   }
-  depths = tile.depths + along.x;
-  for (ptrdiff_t i = along.vectors; i > 0; --i) {
-    FourRows rows;
-    for (ptrdiff_t row = 0; row < kRunEdge; ++row)
-      rows[row] = hn::LoadU(tag, depths + row * stride);
-    along.give(rows);
-    depths += along.step;
-  }
+  codeDepths(tile, plane, tile.depths);
 }
 
 /// Nothing further out: depths are 0.
@@ -419,6 +424,121 @@ void renewWithinPlane(const Tile& tile, const TilePlane& plane) {
   } else {
     tile.stepY < 0 ? renewAcrossRowsBy<rule, -1>(tile, plane) : renewAcrossRowsBy<rule, 1>(tile, plane);
   }
+}
+
+/// A row of three directions: entries of its voxels' terms and of their neighbours', and what comes in and goes out.
+struct FanRow {
+  const FixedDepth* own;
+  const float *code, *high, *low, *nextCode, *nextHigh, *nextLow;
+  const FixedDepth* in[kFanDirections];
+  FixedDepth* out[kFanDirections];
+};
+
+/// `inPlace`: the rows that come in are those that go out.
+template <SegmentRule rule, bool inPlace, bool cut>
+HWY_INLINE void renewFanRow(const FanRow& row, ptrdiff_t width) {
+  const Tag tag;
+  const hn::RebindToFloat<Tag> floats;
+  const FixedDepth *const own = row.own, *const in0 = row.in[0], *const in1 = row.in[1], *const in2 = row.in[2];
+  const float *const code = row.code, *const high = row.high, *const low = row.low;
+  const float *const nextCode = row.nextCode, *const nextHigh = row.nextHigh, *const nextLow = row.nextLow;
+  FixedDepth *const out0 = row.out[0], *const out1 = row.out[1], *const out2 = row.out[2];
+  Depths before = hn::Zero(tag);
+  for (ptrdiff_t x = 0; x < width; x += ptrdiff_t(hn::Lanes(tag))) {
+    const auto codes = hn::LoadU(floats, code + x), highs = hn::LoadU(floats, high + x);
+    const Depths owns = hn::LoadU(tag, own + x);
+    const auto segments = [&](ptrdiff_t stepX) HWY_ATTR {
+      auto integral = hn::Sub(hn::LoadU(floats, nextHigh + x + stepX), highs);
+      if constexpr (rule == SegmentRule::splitIntegral) {
+        integral = hn::Add(integral, hn::Sub(hn::LoadU(floats, nextLow + x + stepX), hn::LoadU(floats, low + x)));
+      }
+      return meanOrOwn(integral, hn::Sub(hn::LoadU(floats, nextCode + x + stepX), codes), owns);
+    };
+    const auto store = [&](Depths depths, FixedDepth* out)
+                           HWY_ATTR { hn::StoreU(cut ? kept(depths) : depths, tag, out + x); };
+    Depths below;
+    if constexpr (inPlace) {
+      const Depths here = hn::LoadU(tag, in0 + x);
+      below = shifted<-1>(here, before);
+      before = here;
+    } else {
+      below = hn::LoadU(tag, in0 + x - 1);
+    }
+    const Depths level = hn::LoadU(tag, in1 + x), above = hn::LoadU(tag, in2 + x + 1);
+    store(hn::Add(below, segments(-1)), out0);
+    store(hn::Add(level, segments(0)), out1);
+    store(hn::Add(above, segments(1)), out2);
+  }
+}
+
+/// One plane along three directions, row by row: in place from the plane before, or in itself against stepY.
+template <SegmentRule rule, int stepY, bool samePlane, bool cut>
+void renewFanPlane(const Fan& fan, size_t plane) {
+  const Tile& middle = *fan[1];
+  const TilePlane& at = middle.planes[plane];
+  const auto stride = ptrdiff_t(middle.stride);
+  // A row comes after those that have yet to read it, or that it has to read.
+  constexpr bool kAscending = samePlane ? stepY < 0 : stepY > 0;
+  for (int place = 0; place < kRunEdge; ++place) {
+    const int row = kAscending ? place : kRunEdge - 1 - place, from = row + stepY;
+    const ptrdiff_t own = at.own + row * stride, neighbour = at.neighbour + row * stride;
+    FanRow rows{};
+    rows.own = middle.terms.own + own;
+    rows.code = middle.terms.code + own;
+    rows.high = middle.terms.high + own;
+    rows.nextCode = middle.terms.code + neighbour;
+    rows.nextHigh = middle.terms.high + neighbour;
+    if constexpr (rule == SegmentRule::splitIntegral) {
+      rows.low = middle.terms.low + own;
+      rows.nextLow = middle.terms.low + neighbour;
+    }
+    for (size_t i = 0; i < kFanDirections; ++i) {
+      FixedDepth* const first = samePlane ? fan[i]->depths : fan[i]->state;
+      rows.in[i] = from < 0 || from >= kRunEdge ? fan[i]->planes[plane].beyond : first + from * stride;
+      rows.out[i] = first + row * stride;
+    }
+    renewFanRow<rule, stepY == 0, cut>(rows, middle.width);
+  }
+  for (const Tile* tile : fan) {
+    const FixedDepth* const first = samePlane ? tile->depths : tile->state;
+    if constexpr (stepY != 0) {
+      std::memcpy(tile->planes[plane].leaving, first + (stepY > 0 ? 0 : kRunEdge - 1) * stride,
+                  size_t(tile->width) * sizeof(FixedDepth));
+    }
+    codeDepths(*tile, tile->planes[plane], first);
+  }
+}
+
+template <SegmentRule rule, bool cut>
+void renewFanBy(const Fan& fan, size_t plane) {
+  if (fan[1]->stepY == 0) {
+    renewFanPlane<rule, 0, false, cut>(fan, plane);
+  } else {
+    fan[1]->stepY < 0 ? renewFanPlane<rule, -1, false, cut>(fan, plane)
+                      : renewFanPlane<rule, 1, false, cut>(fan, plane);
+  }
+}
+
+template <SegmentRule rule>
+void sweepFanBy(const Fan& fan) {
+  const int planes = fan[1]->planeCount;
+  for (int i = 0; i < planes; ++i) {
+    const auto plane = size_t(i);
+    if (fan[1]->planes[plane].neighbourOutside) {
+      for (const Tile* tile : fan)
+        clearPlane<rule>(*tile, tile->planes[plane]);
+    } else if (fan[1]->samePlane) {
+      fan[1]->stepY < 0 ? renewFanPlane<rule, -1, true, true>(fan, plane)
+                        : renewFanPlane<rule, 1, true, true>(fan, plane);
+    } else {
+      i + 1 < planes ? renewFanBy<rule, false>(fan, plane) : renewFanBy<rule, true>(fan, plane);
+    }
+  }
+}
+
+void sweepFanRows(const Fan& fan) {
+  fan[1]->rule == SegmentRule::integral ? sweepFanBy<SegmentRule::integral>(fan)
+                                        : sweepFanBy<SegmentRule::splitIntegral>(fan);
 }
 
 template <SegmentRule rule>
@@ -532,10 +652,15 @@ HWY_AFTER_NAMESPACE();
 namespace freevoxel {
 
 HWY_EXPORT(sweepTileRows);
+HWY_EXPORT(sweepFanRows);
 HWY_EXPORT(storeBrickRuns);
 
 void sweepTile(const Tile& tile) {
   HWY_DYNAMIC_DISPATCH(sweepTileRows)(tile);
+}
+
+void sweepFan(const Fan& fan) {
+  HWY_DYNAMIC_DISPATCH(sweepFanRows)(fan);
 }
 
 void storeRuns(const uint8_t* bytes, size_t planeBytes, std::span<const BrickRow> bricks, size_t firstRun,

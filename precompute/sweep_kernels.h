@@ -52,6 +52,14 @@ struct Tile {
 /// outside the volume all of these are those of depth 0 or, where the sweep gets there from inside, anybody's guess.
 void sweepTile(const Tile& tile);
 
+/// Directions that differ in their steps along x only: -1, 0 and 1.
+inline constexpr int kFanDirections = 3;
+using Fan = std::array<const Tile*, kFanDirections>;
+
+/// The same for three tiles at once, with one of the integral rules: what they read of the voxels they read together.
+/// Depths are not asked for; there must be room for them if the directions stay in their planes.
+void sweepFan(const Fan& fan);
+
 /// Where the runs of a brick go.
 struct BrickRow {
   int x = 0;                       ///< first voxel, a multiple of the brick's edge
