@@ -15,12 +15,14 @@ namespace freevoxel {
 namespace HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+constexpr size_t kCodesPerLine = 32;  // of the cache
+
 #if HWY_TARGET == HWY_AVX3_DL
 
 /// Entries of 64 codes at a time, byte by byte, from `bytes` as CodeTable has them. Returns how many codes of each row
 /// are done.
 size_t lookUpBytes(const uint8_t* bytes, const CodeRows& rows, uint32_t* out, size_t stride) {
-  constexpr size_t kAtOnce = 64;
+  constexpr size_t kAtOnce = 2 * kCodesPerLine;
   // Interleaving leaves 4 entries of every 16 in one register: codes are exchanged so that these follow each other.
   alignas(64) static constexpr std::array<uint8_t, kAtOnce> kExchange = [] {
     std::array<uint8_t, kAtOnce> lowBytes{};
@@ -36,7 +38,7 @@ size_t lookUpBytes(const uint8_t* bytes, const CodeRows& rows, uint32_t* out, si
     const uint16_t* const codes = rows.codes + row * rows.width;
     for (size_t done = 0; done + kAtOnce <= rows.width; done += kAtOnce) {
       __builtin_prefetch(codes + done + rows.ahead);
-      __builtin_prefetch(codes + done + rows.ahead + kAtOnce / 2);
+      __builtin_prefetch(codes + done + rows.ahead + kCodesPerLine);
       const __m512i index = _mm512_permutex2var_epi8(_mm512_loadu_si512(codes + done), exchange,
                                                      _mm512_loadu_si512(codes + done + kAtOnce / 2));
       const __mmask64 second = _mm512_movepi8_mask(index);
@@ -77,6 +79,8 @@ void lookUpRows(const uint32_t* HWY_RESTRICT entries, const uint8_t* bytes, cons
   for (size_t row = 0; row < rows.count; ++row) {
     const uint16_t* HWY_RESTRICT codes = rows.codes + row * rows.width;
     uint32_t* HWY_RESTRICT found = out + row * stride;
+    for (size_t line = done; line < rows.width; line += kCodesPerLine)
+      __builtin_prefetch(codes + line + rows.ahead);
     size_t i = done;
     for (; i + hn::Lanes(tag) <= rows.width; i += hn::Lanes(tag)) {
       const auto index = hn::PromoteTo(integers, hn::LoadU(halves, codes + i));

@@ -21,7 +21,8 @@ namespace freevoxel {
 
 namespace {
 
-/// Rows of one length, each with kRowUnit entries of 0 before and behind it, on cache lines of their own.
+/// Rows of one length, each with room for kRowUnit entries before and behind it, on cache lines of their own. All 0 at
+/// first.
 class Rows {
  public:
   Rows() = default;
@@ -114,20 +115,20 @@ class StripTerms {
     for (int y = inside; y < kRunEdge; ++y)
       clear(rowOf(place, y), width);
     if (inside == 0) return;
+    const auto rows = [&](int first, int end, ptrdiff_t ahead) {
+      return CodeRows{plane + size_t(strip_ * kRunEdge + first) * width, width, size_t(end - first), ahead};
+    };
     // Rows of successive planes lie too far apart for the processor to foresee.
     const bool last = nextStrip < 0 || nextStrip >= shape.strips();
     const ptrdiff_t ahead = last ? 0 : ptrdiff_t(nextStrip - strip_) * kRunEdge * shape.dims.x;
-    const auto rows = [&](int first, int end) {
-      return CodeRows{plane + size_t(strip_ * kRunEdge + first) * width, width, size_t(end - first), ahead};
-    };
-    if (place != 0) segments.terms(rows(0, inside), {own_.row(rowOf(place, 0))}, own_.stride());
+    if (place != 0) segments.terms(rows(0, inside, ahead), {own_.row(rowOf(place, 0))}, own_.stride());
     if (!beside_) return;
     int first = -rowsBefore_, end = inside + (inside == kRunEdge ? rowsBehind_ : 0);
     if (strip_ == 0 && first < 0) clear(rowOf(place, first++), width);
     if (strip_ * kRunEdge + end > shape.dims.y) clear(rowOf(place, --end), width);
     const int row = rowOf(place, first);
-    segments.terms(rows(first, end), {nullptr, floats(code_, row), floats(high_, row), floats(low_, row)},
-                   own_.stride());
+    segments.terms(rows(first, end, place != 0 ? 0 : ahead),
+                   {nullptr, floats(code_, row), floats(high_, row), floats(low_, row)}, own_.stride());
   }
 
   SegmentTerms all() { return {own_.row(0), floats(code_, 0), floats(high_, 0), floats(low_, 0)}; }
@@ -260,6 +261,7 @@ class DirectionSweep {
       plane.leaving = leaving(shape, done + 1);
     }
     tile_.planeCount = place.planes;
+    tile_.depthsWanted = false;
   }
 
   void sweep(const Shape& shape, const CodeSlab& codes, const TilePlace& place, const LevelTarget& levels) {

@@ -306,8 +306,10 @@ HWY_INLINE void renewPlane(const Tile& tile, const TilePlane& plane) {
     terms.move(along.step);
     state += along.step;
     next += along.step;
-    beyond += along.step;
-    leaving += along.step;
+    if constexpr (stepY != 0) {
+      beyond += along.step;
+      leaving += along.step;
+    }
   }
 }
 

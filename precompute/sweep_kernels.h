@@ -14,8 +14,8 @@
 
 namespace freevoxel {
 
-/// What is passed on is cut to this at the end of a tile, along a row in every vector. Everything from 9 log2 on has
-/// A8 = 0, so bytes are those of saturation at 2^32 - 1; and this and 16 segments do not leave 32 bits.
+/// What is passed on is cut to this at the end of a tile at the latest, along a row in every vector. Everything from 9
+/// log2 on has A8 = 0, so bytes are those of saturation at 2^32 - 1; and this and 16 segments do not leave 32 bits.
 inline constexpr FixedDepth kLargestKeptDepth = 0x0fffffff;
 
 /// Rows are this long or a multiple of it, and have as much room before and behind them.
@@ -31,16 +31,18 @@ struct TilePlane {
 };
 
 /// Four rows of voxels along one direction. A voxel passes on what its neighbours further in see: its depth, with the
-/// rule `neighbour` and its own. State is what the plane before passes on. All rows have room before and behind them;
-/// that of state and of what comes from beyond holds zeros, that of terms is outside the volume.
+/// rule `neighbour` and its own. State is what the plane before passes on. All rows have room before and behind them.
+/// That of state, of what comes from beyond and, in a fan, of depths holds zeros. That of terms is outside the volume,
+/// where own, high and low are 0 and codes are infinite: a segment with one end there is 0.
 struct Tile {
   SegmentRule rule = SegmentRule::neighbour;
   SegmentTerms terms;
-  FixedDepth* state = nullptr;   ///< row 0; not used by directions that stay in their plane
-  FixedDepth* depths = nullptr;  ///< room for four rows of depths
-  bool depthsWanted = false;     ///< they are to be there afterwards
-  size_t stride = 0;             ///< from row to row of terms, state and depths
-  int width = 0;                 ///< voxels of a row, rounded up to kRowUnit
+  FixedDepth* state = nullptr;  ///< row 0; not used by directions that stay in their plane
+  /// Four rows for depths. With the rule `neighbour` what stays in its row writes to the room beside them too.
+  FixedDepth* depths = nullptr;
+  bool depthsWanted = false;  ///< they are to be there afterwards
+  size_t stride = 0;          ///< from row to row of terms, state and depths
+  int width = 0;              ///< voxels of a row, rounded up to kRowUnit
   int stepX = 0, stepY = 0;
   bool samePlane = false;           ///< the direction stays in its plane
   const uint8_t* wanted = nullptr;  ///< for each kRowUnit voxels: whether their bytes are needed

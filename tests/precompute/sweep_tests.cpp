@@ -78,26 +78,33 @@ TEST_P(Sweep, equalsRaysMarchedOneByOne) {
   }
 }
 
+/// Codes of one byte, or of two: segments follow from them by different rules.
+std::array<ValueCoding, 2> codings(const TransferFunction& transfer) {
+  return {valueCoding(ValueType::u8, transfer.low, transfer.high), valueCoding(ValueType::u16, transfer.low, 1000.0)};
+}
+
 TEST_P(Sweep, preintegratedEqualsSegmentsAddedOneByOne) {
   const auto [dims, edge] = GetParam();
   const Volume volume = test::randomBytes(dims, 12);
   const TransferFunction transfer = test::veilAndRamp();
-  const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
-  const auto codes = encodeValues(volume, coding);
-  const auto segments = makeSegmentDepth(Classification::preintegrated, transfer, coding);
-  const Planes planes = sweepAll(codes, dims, *segments, edge);
-  for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
-    const glm::ivec3 step(shared::directionX(direction), shared::directionY(direction), shared::directionZ(direction));
-    for (uint64_t i = 0; i < codes.size(); ++i) {
-      const glm::ivec3 p(int(i % uint64_t(dims.x)), int(i / uint64_t(dims.x) % uint64_t(dims.y)),
-                         int(i / (uint64_t(dims.x) * uint64_t(dims.y))));
-      uint64_t sum = 0;
-      for (glm::ivec3 q = p; inside(q + step, dims); q += step) {
-        FixedDepth depth = 0;
-        segments->row({&codes[linearIndex(q, dims)], 1}, {&codes[linearIndex(q + step, dims)], 1}, &depth);
-        sum += depth;
+  for (const ValueCoding& coding : codings(transfer)) {
+    const auto codes = encodeValues(volume, coding);
+    const auto segments = makeSegmentDepth(Classification::preintegrated, transfer, coding);
+    const Planes planes = sweepAll(codes, dims, *segments, edge);
+    for (int direction = 0; direction < shared::kDirectionCount; ++direction) {
+      const glm::ivec3 step(shared::directionX(direction), shared::directionY(direction),
+                            shared::directionZ(direction));
+      for (uint64_t i = 0; i < codes.size(); ++i) {
+        const glm::ivec3 p(int(i % uint64_t(dims.x)), int(i / uint64_t(dims.x) % uint64_t(dims.y)),
+                           int(i / (uint64_t(dims.x) * uint64_t(dims.y))));
+        uint64_t sum = 0;
+        for (glm::ivec3 q = p; inside(q + step, dims); q += step) {
+          FixedDepth depth = 0;
+          segments->row({&codes[linearIndex(q, dims)], 1}, {&codes[linearIndex(q + step, dims)], 1}, &depth);
+          sum += depth;
+        }
+        ASSERT_EQ(planes[size_t(direction)][i], attenuationCode(FixedDepth(std::min<uint64_t>(sum, 0xffffffffu))));
       }
-      ASSERT_EQ(planes[size_t(direction)][i], attenuationCode(FixedDepth(std::min<uint64_t>(sum, 0xffffffffu))));
     }
   }
 }
@@ -106,21 +113,22 @@ TEST_P(Sweep, isTheSameForAnyNumberOfThreadsAndAnyInstructionSet) {
   const auto [dims, edge] = GetParam();
   const Volume volume = test::randomBytes(dims, 13);
   const TransferFunction transfer = test::veilAndRamp();
-  const ValueCoding coding = valueCoding(ValueType::u8, transfer.low, transfer.high);
-  const auto codes = encodeValues(volume, coding);
   const int before = omp_get_max_threads();
-  for (const auto classification : {Classification::voxel, Classification::preintegrated}) {
-    const auto segments = makeSegmentDepth(classification, transfer, coding);
-    omp_set_num_threads(1);
-    const Planes expected = sweepAll(codes, dims, *segments, edge);
-    for (const int threads : {2, 3, 8}) {
-      omp_set_num_threads(threads);
-      for (const int other : {8, 16, 32})
-        EXPECT_EQ(sweepAll(codes, dims, *segments, other), expected);
-    }
-    for (const int64_t target : test::instructionSets()) {
-      const test::InstructionSet chosen(target);
-      EXPECT_EQ(sweepAll(codes, dims, *segments, edge), expected) << hwy::TargetName(target);
+  for (const ValueCoding& coding : codings(transfer)) {
+    const auto codes = encodeValues(volume, coding);
+    for (const auto classification : {Classification::voxel, Classification::preintegrated}) {
+      const auto segments = makeSegmentDepth(classification, transfer, coding);
+      omp_set_num_threads(1);
+      const Planes expected = sweepAll(codes, dims, *segments, edge);
+      for (const int threads : {2, 3, 8}) {
+        omp_set_num_threads(threads);
+        for (const int other : {8, 16, 32})
+          EXPECT_EQ(sweepAll(codes, dims, *segments, other), expected);
+      }
+      for (const int64_t target : test::instructionSets()) {
+        const test::InstructionSet chosen(target);
+        EXPECT_EQ(sweepAll(codes, dims, *segments, edge), expected) << hwy::TargetName(target);
+      }
     }
   }
   omp_set_num_threads(before);
