@@ -28,49 +28,62 @@ mkdir -p docs/results
 
 ## What bounds it
 
-A line is the 64 bytes of one direction that are coded and stored together. The ratio to memset is missed: 0.35 of a memset of 38 GB/s
-by two threads leaves each 9.6 ns a line. The host decides how much that is: the same program on the same two cores takes 11.5 to 13 ns
-a line in one quarter of an hour and 15 to 20 in another (a tile that stays in the nearest cache 4.0 or 5.7), memset does 38 to 40 or
-31 to 34 GB/s and streaming stores 33 to 37 or 24 to 26, so only parts and variants of the same minutes can be compared.
+A line is the 64 bytes of one direction that are coded and stored together. The ratio to memset is missed: 0.35 of a memset of 43 GB/s
+by two threads leaves each 8.5 ns a line, of one of 39 GB/s 9.4; the best sweeps take 9.0. The host decides how much that is: the same program on the
+same two processors takes 9 ns a line in one quarter of an hour and 13 in another, where one of the two, or both, run at two thirds of their
+speed (one thread then does in 134 ms what two do in 125), memset does 38 to 44 or 31 to 36 GB/s; and storing alone may take three to twenty
+times as long for some tenths of a second. So only parts and variants of the same minutes can be compared. Against the version before, in
+interleaved rounds of 256^3 `noise` with two threads: least 36.5 to 32.4 ms, median 54 to 43 (`voxel`), 77.5 to 57.3 and 102 to 72
+(`preintegrated`). Six runs of 256^3 alone, half an hour before the table above: `noise`, `voxel`, two threads 534, 532, 487, 491, 433
+and 396 Mvoxel/s, 0.32, 0.32, 0.31, 0.32, 0.28 and 0.30 of memset, 0.35, 0.37, 0.37, 0.37, 0.32 and 0.34 of streaming stores.
 
-By leaving parts out, 256^3 `noise`, two threads, nothing else running, least of 9 sweeps, two rounds in a good quarter of an hour:
+The cost per voxel of `voxel` with two threads, least times of three rounds in which the sizes took turns: 12.7, 12.9 and 13.4 ns a line for
+128^3, 256^3 and 512^3, so flat within 6 %. Sizes of the table were measured minutes apart.
 
-| | `voxel`, ns a line | `preintegrated`, ns a line |
+Where a thread's time goes in good minutes, by the clock of the processor, 256^3 `noise`:
+
+| | `voxel`, ms | `preintegrated`, ms |
 |---|---:|---:|
-| whole (then 383 to 427 and 202 to 212 Mvoxel/s, 39 to 44 and 79 to 83 ms) | 11.5, 12.9 | 23.2, 24.3 |
-| without storing runs | 9.9, 10.1 | 21.1, 21.4 |
-| without storing and coding | 8.5, 8.8 | 20.2, 20.5 |
-| without looking up terms | 10.5, 10.6 | 17.9, 18.9 |
-| without all of these: state and segments alone | 6.4, 6.7 | 14.4, 14.6 |
+| directions that leave the plane (9 of 13), depths and bytes | 10 to 11 | 24 |
+| those across rows (3) | 3.6 | 7 |
+| those along rows (1) | 2.2 | 3.5 |
+| storing runs | 6.3 to 7.8 | 7 to 11 |
+| terms of voxels: codes looked up | 3.6 to 4.6 | 8 to 10 |
 
-Since then fewer terms are kept (five planes instead of a slab), edges are kept once, and directions within a plane have their rows in
-registers: 58 to 53 ms (`voxel`; `preintegrated` unchanged) in interleaved rounds in a bad quarter of an hour.
+The pass downwards through the planes stores and looks up more slowly than the one upwards, by 1 to 2.5 ms, whichever processor has it and wherever
+its bricks lie; why is not known. If terms are read from the same plane again and again, a sweep takes 28.3 ms instead of 30.2
+(`voxel`): what reading two bytes a voxel, twice by each thread, costs.
 
 A tile alone, swept again and again so that it stays in the near caches, one thread, coding but no storing: directions that leave the
-plane 3.9 to 4.8 ns a line (`voxel`) and 9 to 13 (`preintegrated`), those across rows 4.3 to 5.6 (6.3 to 8.1 before) and 9 to 12, those
-along rows 10.5 and 17. Rows of 64, 128 or 256 voxels make no difference there, so the size of the nearest cache is not what
-bounds the kernel; that state and segments alone take some 2 ns a line more in a whole sweep is put down to the caches behind it. Nor does the division of
-`preintegrated`: with a product in its place segments take as long (2.5 cycles a register, measured alone). Its loads are
-24 registers a line where a step goes along x, half of them across two lines of the cache: 36 accesses, at two a cycle 5 ns.
+plane 3.3 to 3.7 ns a line (`voxel`; 2.5 without coding), those across rows 3.3 to 4.9, those along rows 7.7. With `preintegrated`
+7.2 to 10.6 one by one, 7.8 to 9.1 three at a time (5.4 to 6.8 without coding), 12.6 along rows. A processor here does four additions, two 16-bit products,
+two aligned loads, one store or one load across two lines of the cache per 0.3 ns, and a division of 16 numbers in 0.75 ns.
 
-Streaming stores in this pattern alone take 3.2 to 3.5 ns a line; behind a tile that is in the near caches they add 2.0 to 2.5.
+What made the difference since the version before: pointers that stay in registers, since the rows of everything lie at one stride and
+borders need no masks (14.7 to 10.7 ms for directions that leave the plane, `voxel`); terms looked up for all rows of a plane at once, with the
+next strip's fetched in step (5 to 4 ms, and 15 to 9); sums along rows before their bytes (2.9 to 2.3 ms); state of the next strip
+fetched while this one is swept (3 to 7 %); with `preintegrated` the three directions that differ in x together, row by row
+(59 to 54 ms): terms of a tile are 90 KB, and are read from the second cache for three directions at once.
 
-Tried, with the same bytes, and no faster (interleaved rounds, least times, most of them on a machine that others used too):
-- storing the runs of the tile before one by one in between, so that they overlap with the sweep: 7.9 to 8.9 ns a line against 7.1
-  to 7.7 for tiles in the near caches, 12.7 ms against 10.7 for 128^3 (presumably such stores hold up those behind them, and take the
-  buffers that the next vectors' misses wait for);
-- the three directions that differ in x swept together, terms loaded once for all (aligned rows moved by registers): 20.1 against 18.5 ms
-  for `preintegrated` of 128^3 (the compiler runs out of registers);
-- rows read along x from aligned registers that are shifted, in place of loads across lines: no change for `voxel`, slower for
-  `preintegrated`, whose rows then do not all have registers;
-- fetching state and edges of the next directions ahead: no change; coding each vector after the next one is swept: no change, and
-  slower where it costs registers; sums along rows within quarters of a register first: no change;
-- earlier: keeping what planes pass on in registers for four planes with runs stored as soon as they are coded (11.6 to 13.9 ms against
-  10.5 to 12.7); ordinary stores with the next direction's lines fetched ahead for writing; brick planes in huge pages (memset
-  gains more).
+Streaming stores in this pattern alone take 3.2 to 3.5 ns a line.
+
+Tried, with the same bytes, and no faster (interleaved rounds, least times):
+- storing the runs of the direction before a quarter at a time, between the planes of the next one, so that they overlap: 35.1 ms against 31.5
+  (`voxel`), also if all that planes pass on is loaded just as it was stored, so that it need not reach the cache first: 43.8 against 40.4. One run at
+  a time within the kernel was no faster either;
+- state in registers for four planes where a direction leads straight from plane to plane: 31.4 against 30.9;
+- rows and edges of the next direction fetched while this one is swept: 31.1 against 31.3, and 58.8 against 57.4 (`preintegrated`);
+- depths across rows before their bytes, as along rows: 32.7 against 32.8, and 64.1 against 60.7;
+- coding in a loop of its own, one direction at a time (`preintegrated`): 127 against 124;
+- groups of directions handed to whichever thread is free: no change where both are equally fast, nor where one is held up;
+- earlier, with other kernels: rows read along x from aligned registers that are shifted; coding each vector after the next one is swept; sums
+  along rows within quarters of a register first; ordinary stores with the next direction's lines fetched ahead for writing; brick
+  planes in huge pages (memset gains more).
 
 Memory that nobody has touched comes at 0.3 to 0.6 GB/s here; a sweep of 256^3 works on 6 MB, which a caller who sweeps again keeps
-(`SweepMemory`).
+(`SweepMemory`). Memory that is given back to the system is given back to the host, and slows down what runs in the seconds after: with it
+the attenuation stage of the opacity edit took 147 to 244 ms instead of 84 to 91 (three runs each, halfway through these changes), which is
+why that program keeps what it has.
 TEXT
 } >docs/results/precompute.md.new
 mv docs/results/precompute.md.new docs/results/precompute.md
