@@ -268,7 +268,7 @@ class DirectionSweep {
     levels.depths != nullptr ? sweepPlanes(shape, codes, place, levels) : sweepTile(tile_);
   }
 
-  /// Whether the two directions after `first` differ from it in their steps along x only.
+  /// Whether sweepFan may take `first` and the two directions after it.
   static bool isFan(const DirectionSweep* first, const DirectionSweep* end) {
     if (end - first < kFanDirections || first->tile_.rule == SegmentRule::neighbour) return false;
     for (int i = 0; i < kFanDirections; ++i) {

@@ -31,7 +31,7 @@ mkdir -p docs/results
 A line is the 64 bytes of one direction that are coded and stored together. The ratio to memset is missed: 0.35 of a memset of 43 GB/s
 by two threads leaves each 8.5 ns a line, of one of 39 GB/s 9.4; the best sweeps take 9.0. The host decides how much that is: the same program on the
 same two processors takes 9 ns a line in one quarter of an hour and 13 in another, where one of the two, or both, run at two thirds of their
-speed (one thread then does in 134 ms what two do in 125), memset does 38 to 44 or 31 to 36 GB/s; and storing alone may take three to twenty
+speed (one thread then does in 134 ms what two do in 125, `preintegrated`), memset does 38 to 44 or 31 to 36 GB/s; and storing alone may take three to twenty
 times as long for some tenths of a second. So only parts and variants of the same minutes can be compared. Against the version before, in
 interleaved rounds of 256^3 `noise` with two threads: least 36.5 to 32.4 ms, median 54 to 43 (`voxel`), 77.5 to 57.3 and 102 to 72
 (`preintegrated`). Six runs of 256^3 alone, half an hour before the table above: `noise`, `voxel`, two threads 534, 532, 487, 491, 433
@@ -69,7 +69,8 @@ Streaming stores in this pattern alone take 3.2 to 3.5 ns a line.
 
 Tried, with the same bytes, and no faster (interleaved rounds, least times):
 - storing the runs of the direction before a quarter at a time, between the planes of the next one, so that they overlap: 35.1 ms against 31.5
-  (`voxel`), also if all that planes pass on is loaded just as it was stored, so that it need not reach the cache first: 43.8 against 40.4. One run at
+  (`voxel`), also if all that planes pass on is loaded just as it was stored, so that it need not reach the cache first: 43.8 against 40.4 (a trial whose
+  directions shared a buffer too early, so some of its bytes were wrong; the work was the same). One run at
   a time within the kernel was no faster either;
 - state in registers for four planes where a direction leads straight from plane to plane: 31.4 against 30.9;
 - rows and edges of the next direction fetched while this one is swept: 31.1 against 31.3, and 58.8 against 57.4 (`preintegrated`);

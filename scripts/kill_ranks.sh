@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Kills one of four ranks in the middle of a frame, 20 times, and tells how long the job lasted after that, whether it failed
-# with a message, and whether it left a picture:
+# with a message, and what it left:
 #   scripts/kill_ranks.sh build/release/bin/freevoxel [runs]
-# Exit status 0 if every job ended within 10 seconds, with a message and without a picture.
+# Exit status 0 if every job ended within 10 seconds, with a message, without a broken picture, and without a temporary file
+# that the next picture of that name does not remove: nobody else can remove what the killed rank was writing.
 set -euo pipefail
 program=$(realpath "$1")
 runs=${2:-20}
@@ -39,13 +40,19 @@ for ((run = 0; run < runs; ++run)); do
   milliseconds=$((($(date +%s%N) - start) / 1000000))
   ((milliseconds > longest)) && longest=$milliseconds
   message=$(grep -c "exited on signal 9" talk || true)
-  left=$(find . -name '.p*' | wc -l)
   # Frames that are there must be whole.
   broken=0
   for picture in p_*.exr; do
     "$program" compare "$picture" "$picture" --identical >/dev/null 2>&1 || broken=$((broken + 1))
   done
-  echo "run $run: rank $((run % 4)) killed, job ended after $milliseconds ms, status $status, message $message, partial $left, broken $broken"
+  partial=0
+  for temporary in $(find . -name '.p_*.exr' -printf '%f '); do
+    partial=$((partial + 1))
+    picture=$(sed 's/^\.\(p_[0-9]*\).*/\1/' <<<"$temporary").exr
+    "$program" render a.fvx -o "$picture" --size 8x6 --quiet
+  done
+  left=$(find . -name '.p*' | wc -l)
+  echo "run $run: rank $((run % 4)) killed, job ended after $milliseconds ms, status $status, message $message, partial $partial, of these not removed $left, broken $broken"
   if ((status != 0 && milliseconds < 10000 && message > 0 && left == 0 && broken == 0)); then good=$((good + 1)); fi
   rm -f p_*.exr
 done
